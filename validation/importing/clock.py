@@ -56,6 +56,9 @@ _TIME_OF_DAY = re.compile(
 _MINUTES = re.compile(r"(\d{1,3}):(\d{2})[.,](\d+)")
 #: Days and a time behind them, as pandas and Python write what went by: 0 days 00:00:05.25, 1 day, 0:00:05.
 _DAYS = re.compile(r"(\d+) days?,?\s+(\d.*)")
+#: A date with the month in letters and the time behind it, as MATLAB and loggers in C write it: 10-Jun-2024 06:13:20.
+_MONTH_DATE = re.compile(r"(\d{1,2})[-./\s]([A-Za-z]{3})[a-z]*[-./\s](\d{4}|\d{2})[T,\s]\s*(\d.*)")
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 #: A date as spreadsheets and phones write it, and the time behind it: 01.06.2025, 6/1/2025 or 2025/6/1.
 _DATE = re.compile(r"(?:(\d{4})[-./](\d{1,2})[-./](\d{1,2})|(\d{1,2})[-./](\d{1,2})[-./](\d{4}|\d{2}))[T,\s]\s*(\d.*)")
 
@@ -154,6 +157,9 @@ def _time_of_day(text: str) -> float | None:
 
 def _dated(text: str) -> float | None:
     """Return the seconds since 2000 of a date that is not written as ISO does, with a time behind it."""
+    if (named := _MONTH_DATE.fullmatch(text)) and named[2].lower() in _MONTHS:
+        day, name, year, rest = named.groups()
+        text = f"{year if len(year) > 2 else f'20{year}'}-{_MONTHS.index(name.lower()) + 1}-{day} {rest}"
     match = _DATE.fullmatch(text)
     time = None if match is None else _time_of_day(match[7])
     if match is None or time is None:

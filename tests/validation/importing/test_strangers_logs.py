@@ -43,6 +43,7 @@ def counted(stamp) -> list[str]:
 
 
 STAMPS = {
+    "MATLAB": lambda h, m, s, ms: f"01-Jun-2025 {h:02d}:{m:02d}:{s:02d}.{ms:03d}",
     "a third colon before the milliseconds": lambda h, m, s, ms: f"{h}:{m:02d}:{s:02d}:{ms:03d}",
     "the day first": lambda h, m, s, ms: f"01/06/2025 {h}:{m:02d}:{s:02d}.{ms:03d}",
     "points in the date": lambda h, m, s, ms: f"1.6.2025 {h}:{m:02d}:{s:02d}.{ms:03d}",
@@ -56,6 +57,21 @@ STAMPS = {
 def test_stamps_are_read_as_spreadsheets_and_phones_write_them(tmp_path, form):
     recording, _ = imported(turning(tmp_path, "log.csv", ("Time", counted(STAMPS[form]))), tmp_path)
     assert_allclose(recording.samples["gyroscope"].t, LOG.t, atol=1e-6)
+
+
+def test_a_date_with_the_month_in_letters_is_that_day():
+    assert iso_seconds("10-Jun-2024 06:13:20.125") == iso_seconds("2024-06-10 06:13:20.125")
+    assert iso_seconds("1 December 24 06:13:20") == iso_seconds("2024-12-01 06:13:20")
+    assert iso_seconds("10-Foo-2024 06:13:20") is None
+
+
+def test_a_remark_above_numbers_without_names_makes_no_header_of_them(tmp_path):
+    columns = [("t", (LOG.t * 1e6).round()), *three(named("g{}"), LOG.gyro), *three(named("a{}"), LOG.accel)]
+    columns += three(named("m{}"), LOG.mag)
+    raw = write_table(tmp_path / "log.txt", columns, separator=" ", header=False, before="# teensy log\n")
+    recording, text = imported(raw, tmp_path)
+    assert len(recording.samples["gyroscope"]) == LOG.t.size
+    assert 'columns = ["c1", "c2"' in text
 
 
 @pytest.mark.parametrize("cell", ["14:61:00.5", "32/01/2025 10:00:00", "a:b", "20250601", "1,5", "99:99.1"])

@@ -299,6 +299,6 @@ def _joined(path: Path, layout: Layout, above: list[int], width: int) -> tuple[L
             table = read_raw(path, tried, RepairList(("header", "comment", "width")))
         except InputError:
             continue
-        if len(table.columns) == width:
-            return tried, table.columns
+        if len(table.columns) == width and _share(table.columns, layout) < RECORD_SHARE:
+            return tried, table.columns  # else a remark above the first record, which is no header
     return None

@@ -83,8 +83,8 @@ _SPACINGS = (
 #: Words for time beside the name of a sensor.
 _TIME_WORDS = ("t", "ts")
 _TIME_NAMES = "t ts ms us ns sec secs s msec usec tms tus"
-#: A word of a name: GPS TOW, iTOW (time of week).
-_TIME_OF_WEEK = "tow"
+#: Words of a name: GPS TOW, iTOW (time of week), UTC_Nano.
+_OF_TIME = {"tow", "utc"}
 
 
 def _plain(text: str) -> str:
@@ -215,7 +215,7 @@ def is_time_name(name: str) -> bool:
     return (
         any(stem in plain for stem in _PLAIN_TIME_STEMS)
         or plain in _TIME_NAMES.split()
-        or _TIME_OF_WEEK in re.split(r"[\s_\-.]+", plain)
+        or not _OF_TIME.isdisjoint(re.split(r"[\s_\-.]+", plain))
         or (timeless(rest) != "" and sensor_of(timeless(rest)) is not None)  # t_gyro
         or (unit != "" and any(r.sensor == "time" for r in readings_of(unit)) and sensor_of(rest) is None)
     )
