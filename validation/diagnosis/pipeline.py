@@ -32,7 +32,6 @@ from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import Anew, search
-from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import (
     free_parameters,
@@ -41,7 +40,7 @@ from discsim.validation.diagnosis.setup_effects import (
     without_offsets,
 )
 from discsim.validation.diagnosis.stages import Prepared, Question, Tried
-from discsim.validation.diagnosis.unknown_law.find import FoundLaw, find_law
+from discsim.validation.diagnosis.unknown_law.find import FoundLaw, LawOfAll, find_law
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit
@@ -102,8 +101,7 @@ def _with_law_of_one(tried: Tried, question: Question) -> Tried:
     begun, law = _law_before_effects(ready, question)
     if law is None or law.law.target.partition(".")[0] not in contradiction.against:
         return tried
-    alone = law.share > UNKNOWN_LAW.all and not law.fitted.unmodelled()
-    return Tried(ready, None, begun, law) if alone else tried
+    return Tried(ready, None, begun, law) if law.explains_all else tried
 
 
 def _prepared_first(question: Question) -> Prepared:
@@ -156,8 +154,11 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         hints=hints,
         effects=question.effects,
         progress=progress,
+        law=(law_of_all := LawOfAll()),
     )
     found = search(problem)
+    if law_of_all.found is not None:
+        return Tried(ready, None, found.at_base(), law_of_all.found)
     if ready.rows is not None:  # no bent segments there: defects of continuity are wide, and the pure error is known
         found = refitted_out_of_balance(found)
     elif followed.plant.weakly_identified:

@@ -7,12 +7,14 @@ from numpy.testing import assert_allclose
 from support.made_logs import made_log, three, write_table
 
 from discsim.validation.importing.imported_log import import_log
-from discsim.validation.importing.sniffing.names import is_time_name, sensor_of
+from discsim.validation.importing.sniffing.names import is_time_name, read_name, sensor_of
 
 LOG = made_log()
 
 
-@pytest.mark.parametrize(("name", "is_one"), [("GPS TOW", True), ("iTOW", True), ("tow_ms", True), ("towards", False)])
+@pytest.mark.parametrize(
+    ("name", "is_one"), [("GPS TOW", True), ("iTOW", True), ("tow_ms", True), ("towards", False), ("UTC_Nano", True)]
+)
 def test_a_time_of_the_week_is_a_time(name, is_one):
     assert is_time_name(name) is is_one
 
@@ -35,3 +37,9 @@ def test_the_week_s_time_in_the_third_column_is_that_of_the_rows(tmp_path):
     assert_allclose(recording.samples["accelerometer"].value, LOG.accel, atol=1e-5)
     (named,) = [decision for decision in log.decisions if decision.what == "magnetometer"]
     assert (named.choice, named.sure) == ("hx, hy, hz", "certain")
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_the_y_of_velocity_is_no_axis(axis):
+    name = read_name(f"{'XYZ'[axis]}-axis angular velocity (°/s)")
+    assert (name.axis, sensor_of(name.base)) == (axis, "gyroscope")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from discsim.effects import Effect
 from discsim.recording import Recording
@@ -12,7 +13,15 @@ from discsim.validation.identification.competing_effects import CATALOGUED, Comp
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import Parameter
 
+if TYPE_CHECKING:
+    from discsim.validation.diagnosis.selection.search_state import Search
+
 __all__ = ["SearchProblem"]
+
+
+def _no_law(_: Search) -> bool:
+    """Ask for no law."""
+    return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +45,9 @@ class SearchProblem:
         Those that compete.
     progress : function
         Told of the stages of the search.
+    law : function
+        Tells whether a law explains all that a search has before it, where one effect leaves much of that. It is given
+        the search and asked once.
     """
 
     recordings: Sequence[Recording]
@@ -45,3 +57,4 @@ class SearchProblem:
     hints: Sequence[Effect] = ()
     effects: Competing = CATALOGUED
     progress: Progress = silent
+    law: Callable[[Search], bool] = _no_law

@@ -19,6 +19,7 @@ from discsim.recording import Recording
 from discsim.validation.diagnosis.result import Law
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws, swinging_in_words
 from discsim.validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
@@ -37,7 +38,7 @@ from discsim.validation.identification.normal_equations import common_step, nuis
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants.law_terms import Term
 
-__all__ = ["FoundLaw", "find_law", "left_to_gain"]
+__all__ = ["FoundLaw", "LawOfAll", "find_law", "left_to_gain"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,11 @@ class FoundLaw:
     also: tuple[Law, ...] = field(default_factory=tuple)
     chi2: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     swinging: str = ""
+
+    @property
+    def explains_all(self) -> bool:
+        """Whether nothing but noise is left beside it."""
+        return self.share > UNKNOWN_LAW.all and not self.fitted.unmodelled()
 
 
 # --------------------------------------------------------------------------------------------------- fitting
@@ -196,6 +202,20 @@ def find_law(
     if law is None or (instead and _priced(law.fitted) + SELECTION.entry > best.score):
         return None
     return law
+
+
+@dataclass
+class LawOfAll:
+    """Asks a search whether a law explains all that it has before it, and keeps the law in ``found``."""
+
+    found: FoundLaw | None = None
+
+    def __call__(self, search: Search) -> bool:
+        """Tell whether one does."""
+        args = search.relaxed_fit, search.base, search.own, search.relaxed_noise, search.recordings
+        law = find_law(*args, instead=False)
+        self.found = law if law is not None and law.explains_all else None
+        return self.found is not None
 
 
 def left_to_gain(fit: Fit, about: Collection[str]) -> float:

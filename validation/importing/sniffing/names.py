@@ -118,7 +118,7 @@ def foreign_words(text: str) -> int:
 def _without_axis(name: str) -> tuple[str, int | None]:
     """Return a name without its axis, and the axis: x, y, z (0, 1, 2 in brackets) at the end, in front or between."""
     patterns = (
-        (r"^(.*?)[\s_\-.]*[\[\(]?([xyzXYZ])[\]\)]?$", (1, 2)),
+        (r"^(.*?)[\s_\-.]*[\[\(]?(?<!it)([xyzXYZ])[\]\)]?$", (1, 2)),  # the y of velocity is none
         (r"^(.*?)[\s_\-.]*\[([012])\]$", (1, 2)),
         (r"^()([xyzXYZ])(?:[\s_\-.]+|(?=[A-Z]))(.*)$", (3, 2)),
         (r"^(.+?[\s_\-.])([xyzXYZ])[\s_\-.](.+)$", (1, 2)),

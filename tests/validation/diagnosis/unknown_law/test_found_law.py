@@ -34,8 +34,10 @@ from discsim.validation.challenge.cases.off_catalogue import (
 )
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.selection import stepwise
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.next_effect import next_effect
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw, find_law
 from discsim.validation.identification.noise import estimate_noise
 from discsim.validation.identification.stated_parameters import stated_parameters
@@ -371,6 +373,22 @@ def test_a_bias_that_settles_in_flight_is_no_drift_beside_other_errors_of_its_se
     assert found.law is not None
     assert found.law.text == "c - c * exp(-t/tau)"
     assert found.law.coefficients["tau"].value == pytest.approx(0.658, abs=2.0 * found.law.coefficients["tau"].sd)
+
+
+def test_a_play_far_from_the_data_has_its_law_before_a_stack_of_errors_is_tried(monkeypatch):
+    """On a table a play looks like a lag; each further error took some of it away, for twenty minutes."""
+    asked = []
+
+    def counted(found, current, step):
+        asked.append(step)
+        return next_effect(found, current, step)
+
+    monkeypatch.setattr(stepwise, "next_effect", counted)
+    found = diagnose([recordings(Request(638150).draw())[:2]], ["runs"]).diagnosis
+    assert asked == [0]
+    assert found.law is not None
+    assert (found.law.text, found.law.target) == ("c * play(x, w) - c * x", "accelerometer.x_m_s2")
+    assert found.law.coefficients["w"].value == pytest.approx(2.559, rel=0.02)
 
 
 def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_told():
