@@ -204,11 +204,15 @@ def find_law(
     return law
 
 
-@dataclass
+#: kinds of a sensor's terms that no effect passes for: what turns or swings, and a play, leave what is seen as such
+_NO_COPY = ("turning", "swinging", "play")
+
+
 class LawOfAll:
     """Asks a search whether a law explains all that it has before it, and keeps the law in ``found``."""
 
-    found: FoundLaw | None = None
+    def __init__(self) -> None:
+        self.found: FoundLaw | None = None
 
     def __call__(self, search: Search) -> bool:
         """Tell whether one does."""
@@ -229,7 +233,7 @@ def left_to_gain(fit: Fit, about: Collection[str]) -> float:
     if "motion" in about and fit.plant.laws.terms:
         at = reference_of([state_of(trajectory, fit.values(i)) for i, trajectory in enumerate(fit.trajectories)])
         gains += [gain for gain, _, _ in candidate_laws(fit, fit.parameters, fit.plant.laws.terms, at)]
-    terms = sensor_library(fit, about)
+    terms = sensor_library(fit, about, _NO_COPY)
     gains += [gain for gain, _, _ in _worth(fit, terms, asked_of_sensors(fit, fit.parameters, terms))]
     return max(gains)
 

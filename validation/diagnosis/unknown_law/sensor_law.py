@@ -242,8 +242,10 @@ def swings(fit: Fit, sensor: str) -> list[float]:
     return _peaks(tried, power, 12.0 * step, _STANDS_OUT * float(np.median(power)))
 
 
-def sensor_library(fit: Fit, about: Collection[str] = tuple(SENSORS)) -> list[SensorTerm]:
-    """Return the terms about sensors, or some of them, that are asked for first."""
+def sensor_library(
+    fit: Fit, about: Collection[str] = tuple(SENSORS), without: Collection[str] = ()
+) -> list[SensorTerm]:
+    """Return the terms about sensors, or some of them, that are asked for first, ``without`` some kinds."""
     terms = []
     length = 0.5 * max(float(trajectory.nodes[-1]) for trajectory in fit.trajectories)
     spin = max(float(np.max(np.abs(turned(trajectory).rate(trajectory.nodes[:-1])))) for trajectory in fit.trajectories)
@@ -253,7 +255,7 @@ def sensor_library(fit: Fit, about: Collection[str] = tuple(SENSORS)) -> list[Se
             continue
         spread = float(np.std(np.concatenate(values)))
         units = {"drift": length, "rate": spin, "settling": spin, "reading": spread}
-        for kind in SENSORS[sensor]:
+        for kind in [kind for kind in SENSORS[sensor] if kind not in without]:
             spectral = {"turning": orders, "swinging": swings}
             shape_grid = spectral[kind](fit, sensor) if kind in spectral else SHAPES[kind]
             if kind == "play":
