@@ -146,6 +146,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         if law is not None:
             return Tried(ready, None, begun, law)
 
+    law_of_all = LawOfAll()
     problem = SearchProblem(
         ready.fitted,
         as_stated=ready.meant,
@@ -154,7 +155,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         hints=hints,
         effects=question.effects,
         progress=progress,
-        law=(law_of_all := LawOfAll()),
+        law=law_of_all,
     )
     found = search(problem)
     if law_of_all.found is not None:

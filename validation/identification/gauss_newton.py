@@ -428,14 +428,14 @@ class GaussNewtonStep:
                 for trajectory, linear, r in zip(fit.trajectories, fit.linears, self.reduced, strict=True)
             )
             trial = replace(fit, trajectories=trajectories, at=at)
-            new = self._tried(trial, fraction) if _finite(trajectories) else None
-            if new is not None:
-                return replace(trial, linears=new, merit=merit_of(trial, new), iterations=fit.iterations + 1)
+            better = self._tried(trial, fraction) if _finite(trajectories) else None
+            if better is not None:
+                return better
             fraction *= _SHORTER
         return None
 
-    def _tried(self, trial: Fit, fraction: float) -> tuple[Linear, ...] | None:
-        """Return the linearisations of a trial that improves the fit; None for one that does not.
+    def _tried(self, trial: Fit, fraction: float) -> Fit | None:
+        """Return a trial with its linearisations where it improves the fit; None where it does not.
 
         After a step that leads astray its shorter ones do, too, more often than not. They are asked first with slopes
         by the states of segments alone, which tell the same merit for a quarter to half of the cost.
@@ -444,17 +444,18 @@ class GaussNewtonStep:
         short = fraction == 1.0 and fit.merit - self.expected < CHORD and not discontinuous(fit)
         new = self._by_chord(trial) if short else None
         doubted = new is None and (short or fraction < 1.0) and fit.beside is None
-        if doubted and not self._improves(trial, linearised(trial, ())):
+        if doubted and self._better(trial, linearised(trial, ())) is None:
             return None
-        new = new or linearised(trial)
-        return new if self._improves(trial, new) else None
+        return self._better(trial, new or linearised(trial))
 
-    def _improves(self, trial: Fit, new: Sequence[Linear]) -> bool:
-        """Tell whether a trial with these linearisations is better than the fit."""
+    def _better(self, trial: Fit, new: tuple[Linear, ...]) -> Fit | None:
+        """Return a trial with these linearisations where it is better than the fit; None where it is not."""
         fit, merit = self.fit, merit_of(trial, new)
         # while gaps are open the merit is that of the closed trajectory to first order only: too good
         bar = fit.merit * (1.0 + 1e-9) if not discontinuous(fit) else 1.5 * fit.merit + 10.0 * fit.count
-        return bool(np.isfinite(merit) and merit < bar)
+        if not (np.isfinite(merit) and merit < bar):
+            return None
+        return replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
 
     def _by_chord(self, trial: Fit) -> tuple[Linear, ...] | None:
         """Return the linearisations after a short step with slopes as they were; None where it does not gain as much.

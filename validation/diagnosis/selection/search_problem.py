@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["SearchProblem"]
 
 
-def _no_law(_: Search) -> bool:
-    """Ask for no law."""
-    return False
-
-
 @dataclass(frozen=True, eq=False)
 class SearchProblem:
     """Recordings of one plant whose effects are searched, with all that is known of them before.
@@ -45,7 +40,7 @@ class SearchProblem:
         Those that compete.
     progress : function
         Told of the stages of the search.
-    law : function
+    law : function or None
         Tells whether a law explains all that a search has before it, where one effect leaves much of that. It is given
         the search and asked once.
     """
@@ -57,4 +52,4 @@ class SearchProblem:
     hints: Sequence[Effect] = ()
     effects: Competing = CATALOGUED
     progress: Progress = silent
-    law: Callable[[Search], bool] = _no_law
+    law: Callable[[Search], bool] | None = None

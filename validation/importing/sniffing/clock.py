@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -118,7 +118,7 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
     return evened(value) if clock.shared else value
 
 
-def with_shared_stamps(clock: Clock, readings: Iterable[tuple[Numbers, FloatArray]]) -> Clock:
+def with_shared_stamps(clock: Clock, readings: Sequence[tuple[Numbers, FloatArray]]) -> Clock:
     """Return a clock that several rows of one sensor share a stamp of as such; one whose rows have their own as it is.
 
     ``readings`` are the table and the values (n, k) of each sensor that is read in all of its rows. Rows that stand
@@ -126,8 +126,11 @@ def with_shared_stamps(clock: Clock, readings: Iterable[tuple[Numbers, FloatArra
     """
     if clock.column is None:
         return clock
+    # sensors of one table share its stamps, whose dates are read once
+    tables = {id(numbers): numbers for numbers, _ in readings}
+    repeated = {key: repeats(seconds(clock, numbers)) for key, numbers in tables.items()}
     for numbers, value in readings:
-        again = repeats(seconds(clock, numbers))
+        again = repeated[id(numbers)]
         fresh = again & np.any(np.abs(np.diff(value, axis=0, prepend=np.nan)) > 0.0, axis=1)
         if np.mean(fresh) > SHARED and np.sum(fresh) > 0.5 * np.sum(again):
             each = 1.0 / (1.0 - float(np.mean(again)))

@@ -27,12 +27,14 @@ def wider_range(first: Triple, others: Sequence[Triple]) -> tuple[Triple, Decisi
 
     Units may differ: one is worth as much of the other as their sizes say where the first reads.
     """
+    beside = [other for other in others if other.numbers is first.numbers and other.where == first.where]
+    if not beside:
+        return None
     at_limit = np.any(clipped(first.values, None, None), axis=1)
     if np.mean(at_limit) < OFTEN:
         return None
-    for other in others:
-        alike = other.numbers is first.numbers and other.where == first.where
-        if alike and _reads_on(first, other, at_limit):
+    for other in beside:
+        if _reads_on(first, other, at_limit):
             why = (
                 f"{first.label} stand at their limit in {100 * np.mean(at_limit):.0f} % of the rows, where it reads on"
             )
