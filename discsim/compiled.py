@@ -2,8 +2,8 @@
 
 Numba's own on-disk cache looks only at the file in which a function stands, so an edit to an
 effect would leave the compiled engines that call it stale. Here the cache folder's name holds a
-digest of the sources (of validation/, which nothing compiled is built on, only those that compile),
-so any edit that matters starts a fresh one, and a read-only installation works too.
+digest of the sources (of estimators/ and validation/, which the engines are not built on, only those that
+compile), so any edit that matters starts a fresh one, and a read-only installation works too.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def _cache_folder() -> Path:
     own = [source for source in here.rglob("*.py") if not set(inner) & set(source.parents)]
     for source in sorted(own) + [source for package in inner for source in sorted(package.rglob("*.py"))]:
         text = source.read_bytes()
-        if inner[1] not in source.parents or b"compiled" in text:
+        if not set(inner) & set(source.parents) or b"compiled" in text:
             digest.update(text)
     try:
         base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"

@@ -35,7 +35,7 @@ print("TOLD" + json.dumps(told))
 def told(tmp_path_factory):
     """What a copy of the program says, to which the diff of the page was applied."""
     folder = tmp_path_factory.mktemp("estimator")
-    return folder, told_by_a_copy("An estimator", folder, ASKED)
+    return folder, told_by_a_copy("An estimator", folder, ASKED, compiled=False)
 
 
 def test_the_estimator_of_the_page_tells_the_spin_with_an_honest_deviation(told):

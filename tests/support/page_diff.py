@@ -43,10 +43,11 @@ def applied(diff: str, folder: Path) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def told_by_a_copy(heading: str, folder: Path, asked: str) -> dict[str, Any]:
+def told_by_a_copy(heading: str, folder: Path, asked: str, *, compiled: bool = True) -> dict[str, Any]:
     """Return what a program prints as JSON behind ``TOLD``, run in a copy to which a section's diff was applied.
 
-    The program gets the folder of the copy as its argument.
+    The program gets the folder of the copy as its argument. Where it computes little, compiling takes longer than all
+    of it without being ``compiled``.
     """
     for package in ("discsim", "estimators", "validation", "models"):
         shutil.copytree(ROOT / package, folder / package, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
@@ -57,7 +58,7 @@ def told_by_a_copy(heading: str, folder: Path, asked: str) -> dict[str, Any]:
         text=True,
         check=False,
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder)},
+        env={**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": str(int(not compiled))},
     )
     assert answer.returncode == 0, answer.stdout[-500:] + answer.stderr[-2000:]
     found: dict[str, Any] = json.loads(answer.stdout.partition("TOLD")[2])
