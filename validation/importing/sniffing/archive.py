@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
 from discsim.files import endless
+from discsim.validation.importing.json_records import begins, write_records
 from discsim.validation.importing.logs import kind_of, write_tables
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
@@ -41,9 +42,10 @@ BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|htm
 def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterator[Path]:
     """Give ``raw`` itself, or a folder of that name with the files of a zip or a log's tables, gone afterwards.
 
-    In a folder a receiver's track (NMEA, GPX) becomes a table under its own name beside the other files. ``say`` is
-    told what was left out of a log of messages. Raises `InputError` for no such file, a damaged zip, one
-    with a password, one with paths that lead out of it or links, one above the limits, a log that cannot be read.
+    In a folder a receiver's track (NMEA, GPX) becomes a table under its own name beside the other files; so does what
+    is JSON, there and by itself. ``say`` is told what was left out of a log of messages, and of JSON. Raises
+    `InputError` for no such file, a damaged zip, one with a password, one with paths that lead out of it or links, one
+    above the limits, a log that cannot be read.
     """
     if not raw.exists():
         raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
@@ -63,6 +65,12 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
             for note in write_tables(logged, kind, tables):
                 say(note)
             logged = tables
+        elif logged.is_file() and begins(logged):
+            table = Path(place) / "records" / logged.name
+            table.parent.mkdir()
+            for note in write_records(logged, table):
+                say(note)
+            logged = table
         elif logged.is_dir():
             logged = _with_tracks(logged, Path(place) / "beside" / (logged.resolve().name or "log"), say)
         try:
@@ -72,15 +80,24 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
 
 
 def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path:
-    """Return the folder itself, or where receivers' tracks are in it ``folder``, with their tables and all else."""
+    """Return the folder itself, or where receivers' tracks or JSON are in it ``folder``, their tables and all else."""
     children = [child for child in sorted(logged.iterdir())[:MAX_FILES] if child.is_file()]
     tracks = {child: kind for child in children if (kind := kind_of(child)) is not None and kind.fixes}
-    if not tracks or len(children) == len(tracks):
+    records = [child for child in children if begins(child)]
+    if not records and (not tracks or len(children) == len(tracks)):
         return logged
     folder.mkdir(parents=True)
     for child in logged.iterdir():
-        if child not in tracks:
+        if child not in tracks and child not in records:
             _linked(child, folder / child.name)
+    for child in records:
+        try:
+            notes = write_records(child, folder / child.name)
+        except InputError:  # a description beside the readings: it is named with what else could not be read
+            _linked(child, folder / child.name)
+        else:
+            for note in notes:
+                say(note)
     for child, kind in tracks.items():
         tables = folder.parent / f"{child.name}-tables"
         tables.mkdir()

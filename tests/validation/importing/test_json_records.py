@@ -1,0 +1,113 @@
+"""Logs of JSON (a record a line, a list of them, a list for each sensor, columns) are read as tables of records."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from numpy.testing import assert_allclose
+from support.made_logs import DEG, G0, made_log
+
+from discsim.errors import InputError
+from discsim.validation.importing.imported_log import import_log
+
+LOG = made_log()
+ROWS = list(zip((1000 * LOG.t).round().astype(int).tolist(), (LOG.gyro / DEG).round(3).tolist(),
+                (LOG.accel / G0).round(4).tolist(), LOG.mag.round(2).tolist(), strict=True))  # fmt: skip
+NESTED = [
+    {"ms": t, "gyro": dict(zip("xyz", gyro, strict=True)), "accel": dict(zip("xyz", accel, strict=True)), "mag": mag}
+    for t, gyro, accel, mag in ROWS
+]
+KINDS = ("gyroscope", "accelerometer", "magnetometer")
+LONG = [
+    {"sensor": kind, "time_ms": t, **dict(zip("xyz", map(str, value), strict=True))}
+    for t, *values in ROWS
+    for kind, value in zip(KINDS, values, strict=True)
+]
+COLUMNS = {"time_ms": [t for t, *_ in ROWS]} | {
+    f"{kind}_{axis}": [row[1 + k][j] for row in ROWS] for k, kind in enumerate(KINDS) for j, axis in enumerate("xyz")
+}
+
+
+def lines(records: list[dict[str, Any]]) -> str:
+    return "\n".join([*map(json.dumps, records), ""])
+
+
+FORMS: dict[str, Callable[[], str]] = {
+    "a record a line": lambda: lines(NESTED),
+    "a list": lambda: json.dumps(NESTED),
+    "a list, indented": lambda: json.dumps(NESTED, indent=2),
+    "a list under a heading": lambda: json.dumps({"device": "disc-3", "session": {"hz": 200}, "data": NESTED}),
+    "dictionaries as Python prints them": lambda: "\n".join(map(str, NESTED)),
+    "a row for each sensor": lambda: json.dumps(LONG),
+    "messages of several rows": lambda: lines(
+        [{"id": k, "payload": LONG[k : k + 60]} for k in range(0, len(LONG), 60)]
+    ),
+    "a list for each sensor": lambda: json.dumps({kind: [r for r in LONG if r["sensor"] == kind] for kind in KINDS}),
+    "columns": lambda: json.dumps(COLUMNS),
+    "columns as pandas writes them": lambda: json.dumps(
+        {name: {str(row): value for row, value in enumerate(column)} for name, column in COLUMNS.items()}
+    ),
+    "rows under the names of their columns": lambda: json.dumps(
+        {"columns": [*COLUMNS], "data": [list(row) for row in zip(*COLUMNS.values(), strict=True)]}
+    ),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_log_is_the_same_in_each_form(tmp_path, form):
+    raw = tmp_path / "log.json"
+    raw.write_text(FORMS[form]())
+    found = import_log(raw)
+    samples = found.recordings[0].samples
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
+    assert_allclose(samples["accelerometer"].value[:, 0], LOG.accel[:, 0], atol=1e-3)
+    assert "magnetometer" in samples
+    assert "log.json: JSON, read as a table of its records" in found.summary()
+    assert len(found.throws) == 1
+
+
+def test_what_breaks_off_is_left_out_aloud(tmp_path):
+    whole = json.dumps(NESTED)
+    raw = tmp_path / "log.json"
+    raw.write_text(whole[: len(whole) - 40])
+    found = import_log(raw)
+    assert found.recordings[0].samples["gyroscope"].t.size == len(ROWS) - 1
+    assert "1 piece that is no JSON is LEFT OUT" in found.summary()
+
+
+def test_a_file_for_each_sensor_beside_a_description_is_one_log(tmp_path):
+    folder = tmp_path / "export"
+    folder.mkdir()
+    for kind in KINDS:
+        (folder / f"{kind}.json").write_text(json.dumps([row for row in LONG if row["sensor"] == kind]))
+    (folder / "meta.json").write_text('{"device": "disc-3", "version": 2}')
+    with zipfile.ZipFile(tmp_path / "export.zip", "w") as archive:
+        for path in folder.iterdir():
+            archive.write(path, f"export/{path.name}")
+    for raw in (folder, tmp_path / "export.zip"):
+        found = import_log(raw)
+        assert {*found.recordings[0].samples} == set(KINDS)
+        assert_allclose(found.recordings[0].samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ('{"name": "a disc", "mass_kg": 0.175}', "is JSON without records of numbers in it"),
+        ('{"a": ' * 3000, "is JSON without records of numbers in it"),
+        ('[{"x": 1},', "is JSON without records of numbers in it"),
+        (lines([{f"k{k}_{j}": 1 for j in range(300)} for k in range(4)]), "is JSON of 1200 columns"),
+        (lines([{"x": k, "name": "a"} for k in range(9)]), "no sensor of motion found"),
+    ],
+    ids=["description", "deep", "broken off", "wide", "other"],
+)
+def test_json_without_a_log_in_it_is_refused_with_what_is_expected(tmp_path, text, what):
+    raw = tmp_path / "log.json"
+    raw.write_text(text)
+    with pytest.raises(InputError, match=what):
+        import_log(raw)
