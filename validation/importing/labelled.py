@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from discsim.validation.importing.vectornav import BEGINS, sentence_cells
 
-__all__ = ["RecordLines", "labelled_cells", "names_of_records", "stamped"]
+__all__ = ["RecordLines", "labelled_cells", "names_of_list", "names_of_records", "stamped"]
 
 #: What serial monitors put before a line: "12:01:33.456 -> " (Arduino), "12:01:33.456 > " (PlatformIO), and a stamp in
 #: brackets, with or without the date (Tera Term).
@@ -25,7 +25,10 @@ _TIMES = ("time", "time_ms")
 _NAME = r"([^\W\d][^:=,;|\t\[]*?)"
 #: a number, or what stands for none
 _NUMBER = r"(?:[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN|null|--)"
-_UNITS = "m/s\\^?2|m/s²|m/s/s|rad/s|radians/s|deg/s|degrees/s|°/s|dps|DPS|uT|µT|mG|mg|G|g|ms|us|s|deg ?C|°C|C"
+_UNITS = (
+    "m/s\\^?2|m/s²|m/s/s|rad/s|radians/s|deg/s|degrees/s|°/s|dps|DPS|uT|µT|nT|m?[gG]auss|mG|mg|G|g|ms|us|s|deg ?C|°C|C"
+    "|Hz|deg|°|h?Pa|m"
+)
 #: behind a cell comes its unit, perhaps, then what parts it from the next
 _END = rf"(?:\s*({_UNITS})(?=[\s,;|]|$))?(?:[\s,;|]+|$)"
 _ONE = re.compile(rf"{_NAME}\s*[:=]\s*({_NUMBER}){_END}")
@@ -36,6 +39,8 @@ _BARE_THREE = re.compile(rf"{_NAME}\s*[:=]\s*[(<]?\s*({_NUMBER}(?:\s*[,;\t ]\s*{
 _WORD = re.compile(r"^[^\W\d]+\.\s+")
 _UNIT = re.compile(r" \([^()]*\)$")
 _AXIS = re.compile(r"(.*?)[\s_.]*\b([xyzXYZ])")
+#: a name with its axis glued to it ("ax")
+_GLUED = re.compile(r"(.+)[xyzXYZ]")
 
 
 def stamped(line: str) -> tuple[str, str, str] | None:
@@ -64,6 +69,8 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     ([('gx', '1.0'), ('gy', '-2'), ('gz', '0.5')], [('time', '12:03:20.100'), ('Gyro X', '1.0'), ('t', '2')])
     >>> labelled_cells("Rotation X: 0.1, Y: 0, Z: 2 rad/s")
     [('Rotation X (rad/s)', '0.1'), ('Rotation Y (rad/s)', '0'), ('Rotation Z (rad/s)', '2')]
+    >>> labelled_cells("ax = 1.0 ay = 2.0 az = 9.8 mg")
+    [('ax (mg)', '1.0'), ('ay (mg)', '2.0'), ('az (mg)', '9.8')]
     >>> labelled_cells("Mag (uT) [ 1, 2, 3 ]")
     [('Mag (uT) x', '1'), ('Mag (uT) y', '2'), ('Mag (uT) z', '3')]
     """
@@ -79,7 +86,7 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     while at < len(text):
         if (match := _THREE.match(text, at) or _BARE_THREE.match(text, at)) is not None:
             numbers, owner = re.split(r"[\s,;]+", match[2].strip()), match[1].strip()
-            named = _names_of(owner, len(numbers))
+            named = names_of_list(owner, len(numbers))
         elif (match := _ONE.match(text, at)) is not None:
             numbers, name = [match[2]], match[1].strip()
             axis = _AXIS.fullmatch(name)
@@ -90,15 +97,17 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
             named = [name]
         else:
             return []
+        glued = _GLUED.fullmatch(named[0])
+        shared = owner if glued is None else glued[1]
         if match[3]:
-            units[owner] = match[3]
-        cells += [(owner, name, number) for name, number in zip(named, numbers, strict=True)]
+            units[shared] = match[3]
+        cells += [(shared, name, number) for name, number in zip(named, numbers, strict=True)]
         at = match.end()
-    return found + [(f"{name} ({units[owner]})" if owner in units else name, cell) for owner, name, cell in cells]
+    return found + [(f"{name} ({units[shared]})" if shared in units else name, cell) for shared, name, cell in cells]
 
 
-def _names_of(name: str, count: int) -> list[str]:
-    """Return the names of so many numbers behind one name."""
+def names_of_list(name: str, count: int) -> list[str]:
+    """Return the names of so many numbers under one name: of three x, y and z."""
     if count == 1:
         return [name]
     return [f"{name} {'xyz'[k] if count == 3 else k + 1}" for k in range(count)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -125,7 +124,10 @@ class Layout:
         except csv.Error:
             return [line]
         if self.lists:
-            cells = [item for cell in cells for item in _spread(cell)]
+            closed = sum(map(line.count, "[(")) == sum(
+                map(line.count, "])")
+            )  # else a list broke off, and its last number
+            cells = [item for cell in cells for item in (_spread(cell) if closed else [cell])]
         cells = [cell.strip() for cell in cells]
         return [self._ungrouped(cell) for cell in cells] if self.thousands else cells
 
@@ -176,14 +178,19 @@ class RawTable:
 
 
 def _spread(cell: str) -> list[str]:
+    """Return the numbers of a list in brackets, as Python prints a list, a tuple or an array; else the cell.
+
+    Where a separator parts the numbers of a list already, its brackets are taken off.
+
+    >>> _spread("[1, 2.5]"), _spread("(1, 2)"), _spread("[ 1. -2.]"), _spread("(0.5"), _spread("3)"), _spread("m(a)")
+    (['1', '2.5'], ['1', '2'], ['1.', '-2.'], ['0.5'], ['3'], ['m(a)'])
+    """
     text = cell.strip()
-    if not (text.startswith("[") and text.endswith("]")):
+    bare = text.lstrip("[(").rstrip("])")
+    numbers = [one for one in re.split(r"[\s,]+", bare) if one]
+    if bare == text or any(number(one, ".") is None for one in numbers):
         return [cell]
-    try:
-        items = json.loads(text)
-    except (ValueError, RecursionError):  # no JSON, an integer of thousands of digits, a list within lists without end
-        return [cell]
-    return [str(item) for item in items]
+    return numbers
 
 
 def read_raw(path: Path, layout: Layout, repairs: RepairList) -> RawTable:

@@ -135,3 +135,77 @@ def test_a_map_may_name_cells_without_the_units_behind_them(tmp_path):
     (tmp_path / "own.toml").write_text(short)
     read = import_log(raw, map=str(tmp_path / "own.toml")).recordings[0].samples["gyroscope"]
     assert_allclose(read.value, LOG.gyro, atol=0.006)
+
+
+def printed(form: str) -> list[str]:
+    """Return the lines that a well-known example for a board of nine axes prints of each reading."""
+    found = []
+    for gyro, accel, mag in zip(LOG.gyro / DEG, LOG.accel / G0, LOG.mag, strict=True):
+        (gx, gy, gz), (ax, ay, az), (mx, my, mz) = gyro, accel, mag
+        if form == "SparkFun LSM9DS1":
+            found += [
+                f"G: {gx:.2f}, {gy:.2f}, {gz:.2f} deg/s",
+                f"A: {ax:.4f}, {ay:.4f}, {az:.4f} g",
+                f"M: {mx / 100:.4f}, {my / 100:.4f}, {mz / 100:.4f} gauss",
+                "Pitch, Roll: 1.20, -3.40",
+                "Heading: 12.30",
+                "",
+            ]
+        else:
+            found += [
+                f"ax = {1e3 * ax:.2f} ay = {1e3 * ay:.2f} az = {1e3 * az:.2f} mg",
+                f"gx = {gx:.2f} gy = {gy:.2f} gz = {gz:.2f} deg/s",
+                f"mx = {10 * mx:.1f} my = {10 * my:.1f} mz = {10 * mz:.1f} mG",
+                "rate = 130.00 Hz",
+            ]
+    return found
+
+
+@pytest.mark.parametrize("form", ["SparkFun LSM9DS1", "Winer MPU9250"])
+def test_a_unit_behind_the_last_of_three_is_that_of_all_and_the_field_tells_how_far_apart_rows_are(tmp_path, form):
+    """The first had no magnetometer, the second no sensor of motion; both had rows 0.01 s apart, which are 0.005."""
+    raw = tmp_path / "serial.txt"
+    raw.write_text("\n".join(printed(form)))
+    found = import_log(raw)
+    samples = found.recordings[0].samples
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-3)
+    assert_allclose(samples["magnetometer"].value[:, 2], LOG.mag[:, 2], atol=0.02)
+    assert "with this step the field turns as fast as the gyroscope says (deg/s)" in found.summary()
+    # its standard deviation is 4 %
+    assert samples["gyroscope"].t[-1] == pytest.approx(LOG.t[-1], rel=0.04)
+
+
+@pytest.mark.parametrize(
+    ("line", "header"),
+    [
+        ("({:.4f}, {:.4f}, {:.4f}), ({:.2f}, {:.2f}, {:.2f}), ({:.2f}, {:.2f}, {:.2f})", ""),
+        ('"({:.4f}, {:.4f}, {:.4f})","({:.2f}, {:.2f}, {:.2f})","({:.2f}, {:.2f}, {:.2f})"', "acc,gyro,mag"),
+        ("[{:.4f}, {:.4f}, {:.4f}];[{:.2f}, {:.2f}, {:.2f}];[{:.2f}, {:.2f}, {:.2f}]", "acc;gyro;mag"),
+        ("[ {:.4f} {:.4f} {:.4f}],[{:.2f} {:.2f} {:.2f}],[{:.2f} {:.2f} {:.2f}]", "acc,gyro,mag"),
+    ],
+)
+def test_what_python_prints_of_tuples_and_arrays_is_three_columns_each(tmp_path, line, header):
+    cells = np.column_stack([LOG.accel / G0, LOG.gyro / DEG, LOG.mag])
+    raw = tmp_path / "log.txt"
+    raw.write_text("\n".join([*([header] if header else []), *(line.format(*row) for row in cells), ""]))
+    found = import_log(raw)
+    samples = found.recordings[0].samples
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-3)
+    assert_allclose(samples["magnetometer"].value[:, 2], LOG.mag[:, 2], atol=0.02)
+    assert ("gyro x, gyro y, gyro z" in found.summary()) == bool(header)
+
+
+def test_a_clock_behind_a_word_and_a_counter_without_names_is_the_time(tmp_path):
+    """Rows were taken as 0.01 s apart, and the columns behind the clock were cut in threes from a wrong one on."""
+    rows = [
+        f"v2,{k},{1e6 * t:.0f}," + ",".join(f"{x:.4f}" for x in (*accel, *gyro, *mag)) + ",24.1,3,3"
+        for k, (t, gyro, accel, mag) in enumerate(zip(LOG.t, LOG.gyro / DEG, LOG.accel / G0, LOG.mag, strict=True))
+    ]
+    raw = tmp_path / "log.txt"
+    raw.write_text("\n".join([*rows, ""]))
+    found = import_log(raw)
+    samples = found.recordings[0].samples
+    assert "'c3' in us (likely: whole numbers 5000 apart" in found.summary()
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
+    assert {*samples} == {"gyroscope", "accelerometer", "magnetometer"}

@@ -184,8 +184,10 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     # a slow sensor's own stamps stand on the rows of a fast one
     if not _ascends(value, OWN_STEPS if named and sensor_of(timeless(spoken)) is not None else STEPS):
         return None
-    if not named and (k > 1 or (numbers.dialect.has_header and not _evenly(value, spoken))):
-        return None  # what has another name is another thing; else the first two columns are tried
+    # what has another name is another thing; of columns without a name the first two may count unevenly
+    header, even = numbers.dialect.has_header, named or _evenly(value, spoken)
+    if not named and ((header and k > 1) or ((header or k > 1) and not even)):
+        return None
     slowest = SLOWEST_FIX if numbers.tells_positions else SPACING[1]
     unit, sure, why_unit = _unit(value, spoken, slowest, _of_one_sensor(numbers, value))
     if unit is None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import GAPS
 from discsim.validation.importing.clock import is_stamp
-from discsim.validation.importing.labelled import names_of_records
+from discsim.validation.importing.labelled import names_of_list, names_of_records
 from discsim.validation.importing.raw_table import Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.text import encoding_of
 from discsim.validation.importing.text_lines import TextLines
@@ -31,7 +31,8 @@ WITH_NAMES = 0.4
 #: What the last column is called where the header has a name too few.
 UNNAMED = "unnamed"
 _COMMENTS = ("#", "%", "//", "!")
-_LIST = re.compile(r"\[[^\[\]]*,[^\[\]]*\]")
+#: numbers in brackets, which Python prints of a list, a tuple or an array
+_LIST = re.compile(r"[\[(]\s*[-+.\d][^\[\]()]*[\s,][^\[\]()]*[\])]")
 
 
 @dataclass(frozen=True)
@@ -216,6 +217,9 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
     if len(texts) > 1 and len(texts[-1]) == len(texts[-2]) >= width - 1 and _looks_like_units(texts[-1], layout):
         units, texts, above = tuple(texts.pop()), texts, above[:-1]
         units = units[:width]
+    written = texts[-1] if texts else []
+    if layout.lists and texts:
+        texts[-1] = _spread_names(written, lines[record], layout)
     rows = [layout.cells(lines[record]), layout.cells(lines[-1])]
     names = _fitting(texts[-1], width, rows, layout) if texts else None
     if names is not None and names[-1] == UNNAMED:
@@ -231,11 +235,11 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
         start = record if not layout.comment and above else 0
         return Dialect(replace(layout, skip_lines=start, columns=columns), columns, (), False, record, width, remarks)
     at = above[-1]
-    plain = tuple(texts[-1]) == names and not units and not _is_comment(lines[at], layout.comment)
+    plain = tuple(written) == names and not units and not _is_comment(lines[at], layout.comment)
     if plain and len(set(names)) == len(names):
         before = [line for line in lines[:at] if line.strip() and not _is_comment(line, layout.comment)]
         return Dialect(replace(layout, skip_lines=at if before else 0), names, (), True, record, width, remarks)
-    # names that stand in a comment, twice, or with a line of units below are written into the map
+    # names that stand in a comment, twice, above lists, or with a line of units below are written into the map
     unique = tuple(name if name not in names[:k] else f"{name}.{k + 1}" for k, name in enumerate(names))
     return Dialect(replace(layout, skip_lines=record, columns=unique), unique, units, True, record, width, remarks)
 
@@ -248,6 +252,15 @@ def _header_cells(line: str, layout: Layout) -> list[str]:
     while len(cells) > 1 and not cells[-1]:
         cells.pop()
     return cells
+
+
+def _spread_names(cells: list[str], line: str, layout: Layout) -> list[str]:
+    """Return the names of columns where a record's cells hold lists; as they are where there is not one for each."""
+    joined = _LIST.sub(lambda found: "[" + "~".join(re.split(r"[\s,]+", found[0].strip("[]() "))) + "]", line)
+    sizes = [cell.count("~") + 1 for cell in replace(layout, lists=False).cells(joined)]
+    if len(sizes) != len(cells):
+        return cells
+    return [name for cell, size in zip(cells, sizes, strict=True) for name in names_of_list(cell, size)]
 
 
 def _fitting(cells: list[str], width: int, rows: list[list[str]], layout: Layout) -> tuple[str, ...] | None:

@@ -221,19 +221,23 @@ def _named(
 
 
 def _unnamed(numbers: Numbers, free: list[int], where: tuple[str, str] | None) -> list[Triple]:
-    """Return consecutive columns in threes: from the first if they come out even, else from every column."""
-    step = 3 if len(free) % 3 == 0 else 1
+    """Return neighbouring columns in threes: of a run of them from its first if it comes out even, else from each."""
     own = sensor_of(where[1]) if where is not None else None
     file = own or sensor_of(numbers.path.stem)
     source = f"the id {where[1]}" if where is not None and own else "the file's name" if file else ""
-    sensor = file if len(free) == 3 else None
-    triples = []
-    for start in range(0, len(free) - 2, step):
-        chosen = tuple(free[start : start + 3])
-        if chosen[2] - chosen[0] == 2:
-            columns = (chosen[0], chosen[1], chosen[2])
-            triples.append(Triple(numbers, columns, "", sensor, source, (), "", 0, where))
-    return triples
+    runs: list[list[int]] = []
+    for k in free:
+        if not np.isfinite(numbers.values[:, k]).any():
+            continue  # a word before each row
+        if not runs or k != runs[-1][-1] + 1:
+            runs.append([])
+        runs[-1].append(k)
+    sensor = file if [len(run) for run in runs] == [3] else None
+    return [
+        Triple(numbers, (run[k], run[k + 1], run[k + 2]), "", sensor, source, (), "", 0, where)
+        for run in runs
+        for k in range(0, len(run) - 2, 3 if len(run) % 3 == 0 else 1)
+    ]
 
 
 def _has_readings(triple: Triple) -> bool:

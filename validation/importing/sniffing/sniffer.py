@@ -74,6 +74,9 @@ ORDER = ("gyroscope", "accelerometer", "magnetometer")
 SLOW, RESTS = 1.0, 0.05
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
+#: Steps of rows that are tried, over the one that is guessed (0.01 s): 10 to 1000 rows a second, each within a factor
+#: of two of the next, as far as a search goes from it.
+FACTORS = tuple(np.geomspace(0.1, 10.0, 9).tolist())
 #: Files of a folder that are no tables and named one by one.
 MOST_UNREAD = 4
 
@@ -374,9 +377,18 @@ def _one_clock(tables: Sequence[Numbers]) -> Clock:
     return min(shared, key=order)
 
 
-def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
-    """Return a clock without stamps with the step that the gyroscope and the field's turning give, and their ratio."""
-    if clock.decision.sure != "guess" or fit is None or fit.ratio > TELLING or unit.decision.sure == "guess":
+def _fitted(
+    clock: Clock, fit: Fit | None, unit: Unit, found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray]
+) -> tuple[Clock, float]:
+    """Return a clock without stamps with the step that the gyroscope and the field's turning give, and their ratio.
+
+    ``fit`` is of the usual worths; where the step that was guessed is far off, none of them explains the field.
+    """
+    if clock.decision.sure != "guess" or unit.decision.sure == "guess":
+        return clock, 1.0
+    if fit is None or fit.ratio > TELLING:
+        fit = _turned(found, times, [float(unit.factor("rad_s") * factor) for factor in FACTORS])
+    if fit is None or fit.ratio > TELLING:
         return clock, 1.0
     ratio = fit.worth / unit.factor("rad_s")
     assert clock.step is not None
@@ -443,7 +455,7 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
             return _proposal(sniffed, ticks, offsets)
     notes = [*_on_time(clock, found, times, units, turns, pull), *sniffed.notes]
     if clock.column is None and "gyroscope" in units:
-        clock, slower = _fitted(clock, fit, units["gyroscope"])
+        clock, slower = _fitted(clock, fit, units["gyroscope"], found, times)
         times = {sensor: slower * time for sensor, time in times.items()}
         notes = [*filter(None, [counter_note(clock)]), *notes]
     readings = {sensor: _in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
@@ -564,9 +576,11 @@ def _reading(t: FloatArray, value: FloatArray) -> Reading3:
     return Reading3(t[order], value[order])
 
 
-def _turned(found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray]) -> Fit | None:
+def _turned(
+    found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], worths: Sequence[float] = WORTHS
+) -> Fit | None:
     if "gyroscope" not in found or "magnetometer" not in found:
         return None
     gyro, field = found["gyroscope"][0], found["magnetometer"][0]
     steps = steps_between(times["gyroscope"], gyro.values, times["magnetometer"], field.values)
-    return best_worth(steps, WORTHS)
+    return best_worth(steps, worths)
