@@ -1,10 +1,11 @@
-"""Names that loggers of one maker have: a time of the GPS week, hx hy hz of a magnetometer."""
+"""Names that loggers of one kind have: a time of the GPS week, hx hy hz of a magnetometer, p q r, a message's stamp."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.made_logs import made_log, three, write_table
+from support.made_logs import DEG, G0, made_log, three, write_table
 
 from discsim.validation.importing.imported_log import import_log
 from discsim.validation.importing.sniffing.names import is_time_name, read_name, sensor_of
@@ -43,3 +44,54 @@ def test_the_week_s_time_in_the_third_column_is_that_of_the_rows(tmp_path):
 def test_the_y_of_velocity_is_no_axis(axis):
     name = read_name(f"{'XYZ'[axis]}-axis angular velocity (°/s)")
     assert (name.axis, sensor_of(name.base)) == (axis, "gyroscope")
+
+
+@pytest.mark.parametrize("names", [("p", "q", "r"), ("P", "Q", "R"), ("roll_rate", "pitch_rate", "yaw_rate")])
+def test_the_rates_of_flight_mechanics_are_a_gyroscope(tmp_path, names):
+    columns = [("time_us", 1e6 * LOG.t), ("roll", 0 * LOG.t), ("pitch", 0 * LOG.t), ("yaw", 0 * LOG.t)]
+    columns += [*three(names, LOG.gyro), *three(["ax", "ay", "az"], LOG.accel)]
+    log = import_log(write_table(tmp_path / "log.csv", columns))
+    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-5)
+
+
+def test_what_a_phone_s_fusion_gives_is_read_where_it_is_all_there_is(tmp_path):
+    """It has the rate less its bias, and the field less its iron; the log had no gyroscope."""
+    columns = [("loggingTime(txt)", [f"2026-08-11 14:03:{20 + t:06.3f} +0200" for t in LOG.t])]
+    columns += three([f"accelerometerAcceleration{axis}(G)" for axis in "XYZ"], LOG.accel / G0)
+    columns += three([f"motionRotationRate{axis}(rad/s)" for axis in "XYZ"], LOG.gyro)
+    columns += three([f"motionUserAcceleration{axis}(G)" for axis in "XYZ"], LOG.accel / G0 - [0.0, 0.0, 1.0])
+    columns += three([f"motionMagneticField{axis}(uT)" for axis in "XYZ"], LOG.mag)
+    samples = import_log(write_table(tmp_path / "log.csv", columns)).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-5)
+    assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-4)
+    assert_allclose(samples["magnetometer"].value, LOG.mag, atol=1e-4)
+    columns += three([f"gyroRotation{axis}(rad/s)" for axis in "XYZ"], LOG.gyro + 0.02)
+    samples = import_log(write_table(tmp_path / "both.csv", columns)).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value, LOG.gyro + 0.02, atol=1e-5)
+
+
+def test_a_message_s_own_stamp_is_its_time_and_not_when_it_came(tmp_path):
+    late = np.random.default_rng(2).exponential(1e6, LOG.t.size)
+    columns = [
+        ("%time", [str(1786457048_000000000 + round(1e9 * t + more)) for t, more in zip(LOG.t, late, strict=True)]),
+        ("field.header.seq", np.arange(LOG.t.size)),
+        ("field.header.stamp", [str(1786457048_000000000 + round(1e9 * t)) for t in LOG.t]),
+    ]
+    columns += three([f"field.angular_velocity.{axis}" for axis in "xyz"], LOG.gyro)
+    columns += three([f"field.linear_acceleration.{axis}" for axis in "xyz"], LOG.accel)
+    samples = import_log(write_table(tmp_path / "imu.csv", columns)).recordings[0].samples
+    assert_allclose(samples["gyroscope"].t - samples["gyroscope"].t[0], LOG.t, atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "per"), [("ms", 1000), ("header.stamp.nanosec", 10**9)])
+def test_parts_of_a_second_beside_its_count_go_on(tmp_path, name, per):
+    """The import had taken the wraps out, but units and axes were looked for in times that fell back each second."""
+    ms = (1000 * LOG.t).round().astype(int) + 210
+    columns = [("second", ms // 1000), (name, ms % 1000 * (per // 1000))]
+    columns += [*three(["gx", "gy", "gz"], LOG.gyro / DEG), *three(["ax", "ay", "az"], LOG.accel / G0)]
+    columns += three(["mx", "my", "mz"], LOG.mag)
+    log = import_log(write_table(tmp_path / "log.csv", columns))
+    samples = log.recordings[0].samples
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
+    assert "gyroscope unit: deg/s (likely: the field turns as fast in this unit)" in log.summary()
+    assert "so the field turns as the gyroscope says" in log.summary()

@@ -64,9 +64,9 @@ _STAND_BACK = {
     9: (
         "lin linear user fe fl ned enu earth world ohne without sans senza gravity err error bias offset setpoint "
         "target std var abs absolute absolutbetrag norm magnitude quat euler roll pitch yaw angle orientation vel "
-        "velocity pos delta jerk heading recovery temp motion"
+        "velocity pos delta jerk heading recovery temp"
     ),
-    2: "uncal uncalibrated unfilt debug 2 second",
+    2: "uncal uncalibrated unfilt debug 2 second motion",
     1: "filt filtered lpf",
 }
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
@@ -115,6 +115,10 @@ def foreign_words(text: str) -> int:
     return sum(len(stem) for stem in _FOREIGN if stem in plain)
 
 
+#: The rates about a body's axes as flight mechanics calls them, and the axis of each.
+_RATES = {"p": 0, "q": 1, "r": 2, "rollrate": 0, "pitchrate": 1, "yawrate": 2}
+
+
 def _without_axis(name: str) -> tuple[str, int | None]:
     """Return a name without its axis, and the axis: x, y, z (0, 1, 2 in brackets) at the end, in front or between."""
     patterns = (
@@ -135,8 +139,14 @@ def _without_axis(name: str) -> tuple[str, int | None]:
 
 
 def read_name(name: str) -> Name:
-    """Take a column's name apart."""
+    """Take a column's name apart.
+
+    >>> read_name("Gyro X (deg/s)"), read_name("yaw_rate")
+    (Name(base='Gyro', axis=0, unit='deg/s'), Name(base='rotrate', axis=2, unit=''))
+    """
     rest, unit = split_unit(name.strip())
+    if (axis := _RATES.get(re.sub(r"[\s_\-]+", "", rest.lower()))) is not None:
+        return Name("rotrate", axis, unit)
     base, axis = _without_axis(rest)
     base = base.rstrip(" /")
     if not unit and base:
