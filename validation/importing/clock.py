@@ -191,7 +191,8 @@ def mended(time: FloatArray, scale: float) -> Clock:
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     if usual == 0:
         return Clock(t, stretch, ())
-    ahead = [int(k) for k in np.flatnonzero(steps > max(SET, 50 * LONGEST * usual)) + 1 if _apart(-t, int(k))]
+    least = max(SET, 50 * LONGEST * usual)
+    ahead = [int(k) for k in np.flatnonzero(steps > least) + 1 if _apart(-t, int(k), least)]
     back = [int(k) for k in np.flatnonzero(steps < -LONGEST * usual) + 1 if _apart(t, int(k))]
     widths = {k: _width(t[k - 1] - t[k], usual, scale) for k in back}
     breaks = []
@@ -220,10 +221,10 @@ def _tells(width: float, fall: float, usual: float, widths: Sequence[tuple[float
     return twice or width > TELLING * max(width - fall, usual)
 
 
-def _apart(t: FloatArray, k: int) -> bool:
-    """Tell whether the rows before and after a step back lie apart: all later ones are earlier in time."""
+def _apart(t: FloatArray, k: int, least: float = 0.0) -> bool:
+    """Tell whether the rows before and after a step back lie apart: all later ones are earlier, by ``least`` s."""
     before, after = t[max(0, k - APART) : k], t[k : k + APART]
-    return min(before.size, after.size) >= 2 and bool(np.max(after) < np.min(before))
+    return min(before.size, after.size) >= 2 and bool(np.max(after) < np.min(before) - least)
 
 
 def _width(fall: float, usual: float, scale: float) -> tuple[float, str] | None:

@@ -29,6 +29,7 @@ from discsim.validation.importing.raw_table import Layout, RawTable, Repair, Rep
 from discsim.validation.importing.row_clock import RowClock, row_clock
 from discsim.validation.importing.sensor_rows import chosen_rows, hollow_rows, sensor_rows
 from discsim.validation.importing.timing import row_timing
+from discsim.validation.importing.wild import without_wild
 
 __all__ = [
     "Imported",
@@ -105,6 +106,8 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     readings, said = fixes_once(readings, tables, import_map, repairs)
     notes += said
     readings, said = _without_failed(readings, import_map, tables, repairs)
+    notes += said
+    readings, said = without_wild(readings, tables, repairs)
     notes += said
     readings, said = _without_glitches(readings, tables, repairs)
     notes += said

@@ -303,3 +303,37 @@ def test_a_gyroscope_that_rests_at_minus_one_has_not_failed_there():
     value = np.round(LOG.gyro / DEG + np.random.default_rng(3).normal(-0.8, 0.6, LOG.gyro.shape))
     assert np.count_nonzero(np.all(value == -1, axis=1)) > 10
     assert not failed_rows("gyroscope", value).any()
+
+
+def test_bytes_of_another_record_spoil_neither_units_nor_sensors_nor_the_clock(tmp_path):
+    """Random bits as numbers: the accelerometer was none, the gyroscope in another unit, and quaternions a field."""
+    rng = np.random.default_rng(6)
+    spoilt = ROWS % 333 == 100
+    time = np.round(1000 * LOG.t).astype(int) + 48000
+    columns = [("index", ROWS), ("uptime", np.where(spoilt, 658369253, time))]
+    quaternions = np.tile([0.01, 0.02, 0.03], (ROWS.size, 1))
+    for names, value in (
+        (["accel x", "accel y", "accel z"], LOG.accel),
+        (["gyro x", "gyro y", "gyro z"], LOG.gyro),
+        (["quat x", "quat y", "quat z"], quaternions),
+    ):
+        wild = rng.normal(size=value.shape) * 10.0 ** rng.integers(8, 30, size=value.shape)
+        columns += three(names, np.where(spoilt[:, None], wild, value))
+    found = import_log(write_table(tmp_path / "log.csv", columns))
+    samples = found.recordings[0].samples
+    assert {*samples} == {"gyroscope", "accelerometer"}
+    assert_allclose(samples["gyroscope"].t, (LOG.t - LOG.t[0])[~spoilt], atol=1e-6)
+    assert_allclose(samples["gyroscope"].value, LOG.gyro[~spoilt], atol=1e-5)
+    assert_allclose(samples["accelerometer"].value, LOG.accel[~spoilt], atol=1e-5)
+
+
+def test_a_reading_far_beyond_all_others_is_a_gap_and_a_knock_none(tmp_path):
+    accel = LOG.accel / G0
+    accel[ROWS == 300] = (9e4, 1.0, 1.0)
+    accel[ROWS == 500] = (150.0, 1.0, 1.0)  # a knock
+    columns = [("ms", np.round(1000 * LOG.t).astype(int)), *three(NAMES["gyroscope"], LOG.gyro / DEG)]
+    columns += three([f"{name}_g" for name in NAMES["accelerometer"]], accel)
+    found = import_log(write_table(tmp_path / "log.csv", columns))
+    value = found.recordings[0].samples["accelerometer"].value
+    assert np.flatnonzero(np.isnan(value).any(axis=1)).tolist() == [300]
+    assert "accelerometer: 1 of 2000 rows hold numbers 10000 times beyond all others" in found.summary()

@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
 from discsim.files import endless
-from discsim.validation.importing.json_records import begins, write_records
+from discsim.validation.importing import json_records, teleplot
 from discsim.validation.importing.logs import kind_of, write_tables
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
@@ -65,10 +65,10 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
             for note in write_tables(logged, kind, tables):
                 say(note)
             logged = tables
-        elif logged.is_file() and begins(logged):
+        elif logged.is_file() and (write := _to_records(logged)) is not None:
             table = Path(place) / "records" / logged.name
             table.parent.mkdir()
-            for note in write_records(logged, table):
+            for note in write(logged, table):
                 say(note)
             logged = table
         elif logged.is_dir():
@@ -83,16 +83,16 @@ def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path
     """Return the folder itself, or where receivers' tracks or JSON are in it ``folder``, their tables and all else."""
     children = [child for child in sorted(logged.iterdir())[:MAX_FILES] if child.is_file()]
     tracks = {child: kind for child in children if (kind := kind_of(child)) is not None and kind.fixes}
-    records = [child for child in children if begins(child)]
+    records = {child: write for child in children if (write := _to_records(child)) is not None}
     if not records and (not tracks or len(children) == len(tracks)):
         return logged
     folder.mkdir(parents=True)
     for child in logged.iterdir():
         if child not in tracks and child not in records:
             _linked(child, folder / child.name)
-    for child in records:
+    for child, write in records.items():
         try:
-            notes = write_records(child, folder / child.name)
+            notes = write(child, folder / child.name)
         except InputError:  # a description beside the readings: it is named with what else could not be read
             _linked(child, folder / child.name)
         else:
@@ -109,6 +109,13 @@ def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path
             continue
         (tables / "gps.csv").rename(folder / child.name)
     return folder
+
+
+def _to_records(path: Path) -> Callable[[Path, Path], list[str]] | None:
+    """Return what writes a text's records as a table, and what to say of them; None where it is a table as it is."""
+    if json_records.begins(path):
+        return json_records.write_records
+    return teleplot.write_joined if teleplot.begins(path) else None
 
 
 def _linked(source: Path, target: Path) -> None:

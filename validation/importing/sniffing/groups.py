@@ -28,6 +28,7 @@ from discsim.validation.importing.sniffing.names import (
 )
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 from discsim.validation.importing.unsigned import signed
+from discsim.validation.importing.wild import wild_rows
 
 __all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 
@@ -149,6 +150,8 @@ class Triple:
         value = np.where(failed[:, None], np.nan, value) if failed.any() else value
         cells = failed_on_one_axis(value)
         value = np.where(cells, np.nan, value) if cells.any() else value
+        wild = wild_rows(value)
+        value = np.where(wild[:, None], np.nan, value) if wild.any() else value
         if self.sensor != "gyroscope":
             return value
         whole = [continued(column) for column in value.T]

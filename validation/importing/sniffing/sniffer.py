@@ -102,7 +102,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     tables = [file.numbers for file in files]
     fixes = [numbers for numbers in tables if numbers.tells_positions]
     clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or tables)
-    unknown = [triple for triple in left if triple.sensor is None and _on(clock, triple.numbers)]
+    unknown = [t for t in left if t.sensor is None and t.penalty < NO_READING and _on(clock, t.numbers)]
     missing = [sensor for sensor in ORDER if sensor not in found]
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
