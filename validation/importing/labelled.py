@@ -43,6 +43,10 @@ _AXIS = re.compile(r"(.*?)[\s_.]*\b([xyzXYZ])")
 _GLUED = re.compile(r"(.+)[xyzXYZ]")
 
 
+#: What Teleplot takes from a serial port: ">gx:1.0", also with ms since 1970 and a unit (">gx:1627551892437:1.0|dps").
+_TELEPLOT = re.compile(rf"^>([^:|]+):(?:(\d{{9,}}(?:\.\d+)?):)?({_NUMBER})(?:[|\u00a7](.*))?$")
+
+
 def stamped(line: str) -> tuple[str, str, str] | None:
     """Return what a serial monitor or ESP-IDF's log put before a line: the time's name, the stamp, and what follows.
 
@@ -71,11 +75,16 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     [('Rotation X (rad/s)', '0.1'), ('Rotation Y (rad/s)', '0'), ('Rotation Z (rad/s)', '2')]
     >>> labelled_cells("ax = 1.0 ay = 2.0 az = 9.8 mg")
     [('ax (mg)', '1.0'), ('ay (mg)', '2.0'), ('az (mg)', '9.8')]
+    >>> labelled_cells(">gx:1627551892437:1.0|dps")
+    [('time_ms', '1627551892437'), ('gx (dps)', '1.0')]
     >>> labelled_cells("Mag (uT) [ 1, 2, 3 ]")
     [('Mag (uT) x', '1'), ('Mag (uT) y', '2'), ('Mag (uT) z', '3')]
     """
     if line.startswith(BEGINS):
         return sentence_cells(line)
+    if (told := _TELEPLOT.match(line.strip())) is not None:
+        reading = (f"{told[1].strip()} ({told[4]})" if told[4] else told[1].strip(), told[3])
+        return [(_TIMES[1], told[2]), reading] if told[2] else [reading]
     begun = stamped(line)
     found = [] if begun is None else [begun[:2]]
     text = _WORD.sub("", (line if begun is None else begun[2]).strip())

@@ -209,3 +209,19 @@ def test_a_clock_behind_a_word_and_a_counter_without_names_is_the_time(tmp_path)
     assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
     assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
     assert {*samples} == {"gyroscope", "accelerometer", "magnetometer"}
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_what_a_device_prints_for_teleplot_is_read(tmp_path, stamped):
+    """One number a line, with or without the time and a unit; there were "no rows of numbers in it"."""
+    lines = []
+    for t, gyro, accel, mag in zip(LOG.t, LOG.gyro / DEG, LOG.accel / G0, LOG.mag, strict=True):
+        for name, value, unit in (("g", gyro, "dps"), ("a", accel, "g"), ("m", mag, "uT")):
+            at, behind = (f"{1627551892437 + 1000 * t:.0f}:", f"|{unit}") if stamped else ("", "")
+            lines += [f">{name}{axis}:{at}{x:.4f}{behind}" for axis, x in zip("xyz", value, strict=True)]
+    raw = tmp_path / "serial.txt"
+    raw.write_text("\n".join(["booting", *lines, ""]))
+    samples = import_log(raw).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
+    assert_allclose(samples["accelerometer"].value[:, 2], LOG.accel[:, 2], atol=1e-3)
+    assert_allclose(samples["gyroscope"].t, LOG.t, rtol=1e-6 if stamped else 0.04, atol=1e-6)

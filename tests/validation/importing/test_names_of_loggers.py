@@ -95,3 +95,16 @@ def test_parts_of_a_second_beside_its_count_go_on(tmp_path, name, per):
     assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
     assert "gyroscope unit: deg/s (likely: the field turns as fast in this unit)" in log.summary()
     assert "so the field turns as the gyroscope says" in log.summary()
+
+
+@pytest.mark.parametrize(
+    ("name", "axis", "sensor"),
+    [
+        ("Data Set 1:X-axis acceleration(m/s²)", 0, "accelerometer"),
+        ("Latest: Y-axis gyro (rad/s)", 1, "gyroscope"),
+        ("Run 1: Magnetic field Z (mT)", 2, "magnetometer"),
+    ],
+)
+def test_what_vernier_puts_before_a_name_hides_no_axis(name, axis, sensor):
+    found = read_name(name)
+    assert (found.axis, sensor_of(found.base)) == (axis, sensor)

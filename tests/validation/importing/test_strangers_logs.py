@@ -316,6 +316,10 @@ def test_of_a_zip_with_several_folders_the_folders_are_named_and_not_where_it_wa
 
 REFUSED = {
     "lines.jsonl": ('{"t": 0.0, "gx": 1.0}\n{"t": 0.1, "gx": 1.0}\n', "is JSON; write it as CSV"),
+    "registers.txt": (
+        "FFF6 0008 0808 0000 0000 FFFF\nFFFE 000E 0801 FFFD FFFF 0001\n" * 20,
+        "its numbers are hexadecimal",
+    ),
     "list.json": ('[{"sensor":"Gyroscope","x":"0.1"}]', "is JSON; write it as CSV"),
     "track.kml": ('<?xml version="1.0"?>\n<kml></kml>\n', "is XML"),
     "00000012.log": ("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n" * 9, "is an ArduPilot text log"),

@@ -28,6 +28,9 @@ RECORD_SHARE = 0.4
 LABELLED = 0.8
 #: Between the lines of a record over several there may be blank ones and headings: up to three to two of names.
 WITH_NAMES = 0.4
+#: Of hexadecimal numbers of four digits five in six have a letter; an identifier may have one in each row.
+HEXADECIMAL = 0.25
+_HEXADECIMAL = re.compile(r"(?:0[xX])?(?=[0-9A-Fa-f]*[A-Fa-f])(?=[0-9A-Fa-f]*\d|[Ff]+$)[0-9A-Fa-f]{2,8}")
 #: What the last column is called where the header has a name too few.
 UNNAMED = "unnamed"
 _COMMENTS = ("#", "%", "//", "!")
@@ -64,6 +67,7 @@ def dialect_of(path: Path) -> Dialect:
     if (labelled := _labelled(head, encoding) or _labelled(sample, encoding)) is not None:
         return labelled
     layout, width = _separators(path, sample, Layout(comment=comment, encoding=encoding))
+    _refuse_hexadecimal(path, [cell for line in sample for cell in layout.cells(line)])
     records = [index for index, _ in islice(_records(_bare(lines, comment), width, layout), 2)]
     if len(records) < 2:
         raise InputError.at(path, None, _no_rows(sample[0]))
@@ -80,6 +84,18 @@ def _refuse_echo(path: Path, sample: Sequence[str]) -> None:
             None,
             "is the YAML that `ros2 topic echo` (`rostopic echo`) prints, no table; expected the bag itself as .mcap, "
             "or a table: `rostopic echo -b BAG -p TOPIC > imu.csv`",
+        )
+
+
+def _refuse_hexadecimal(path: Path, cells: Sequence[str]) -> None:
+    """Refuse registers as they are read, in hexadecimal: those without a letter in them would pass for numbers."""
+    lettered = [cell for cell in cells if _HEXADECIMAL.fullmatch(cell)]
+    if len(lettered) > HEXADECIMAL * len(cells):
+        raise InputError.at(
+            path,
+            None,
+            f"its numbers are hexadecimal ('{lettered[0][:20]}'); expected decimal ones: have the logger print such, "
+            "or turn them (in Python: int(cell, 16), less 65536 where it is above 32767)",
         )
 
 

@@ -125,7 +125,7 @@ def _without_axis(name: str) -> tuple[str, int | None]:
         (r"^(.*?)[\s_\-.]*[\[\(]?(?<!it)([xyzXYZ])[\]\)]?$", (1, 2)),  # the y of velocity is none
         (r"^(.*?)[\s_\-.]*\[([012])\]$", (1, 2)),
         (r"^()([xyzXYZ])(?:[\s_\-.]+|(?=[A-Z]))(.*)$", (3, 2)),
-        (r"^(.+?[\s_\-.])([xyzXYZ])[\s_\-.](.+)$", (1, 2)),
+        (r"^(.+?[\s_\-.:])([xyzXYZ])[\s_\-.](.+)$", (1, 2)),
         (r"^(.+?[a-z])([XYZ])[\s_\-]?([A-Za-z]+)$", (1, 2)),
         (r"^((?:.+[\s_.])?)([xyz])((?:acc|gyr|mag)[a-z]*\d?)$", (1, 2)),  # xacc, as MAVLink has it
     )
