@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import csv
+import io
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -62,13 +63,14 @@ def write_records(raw: Path, target: Path) -> list[str]:
         raise InputError.at(
             raw, None, "is JSON without records of numbers in it; expected a list of them, or one in each line"
         )
-    if len(tables) == 1:
-        _write(raw, target, next(iter(tables.values())))
+    texts = {name: _text(raw, rows) for name, rows in tables.items()}
+    if len(texts) == 1:
+        target.write_text(next(iter(texts.values())), encoding="utf-8")
     else:
         target.mkdir()
-        for name, rows in tables.items():
+        for name, table in texts.items():
             plain = re.sub(r"[^\w.-]+", "-", name)
-            _write(raw, target / f"{plain}.csv", rows)
+            (target / f"{plain}.csv").write_text(table, encoding="utf-8")
     counted = ", ".join(
         f"{len(rows)} of {printable(name)}" if name else str(len(rows)) for name, rows in tables.items()
     )
@@ -149,15 +151,17 @@ def _lists_of_numbers(value: _Record, name: str = "") -> Iterator[tuple[str, lis
             yield full, part
 
 
-def _write(raw: Path, target: Path, records: Sequence[_Record]) -> None:
+def _text(raw: Path, records: Sequence[_Record]) -> str:
+    """Return records as comma-separated text, a column for each name in the order in which they come."""
     rows = [dict(_flat(record)) for record in records]
     names = list(dict.fromkeys(name for row in rows for name in row))
     if len(names) > MAX_COLUMNS:
         raise InputError.at(raw, None, f"is JSON of {len(names)} columns; expected a record for each reading")
-    with target.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows([row.get(name, "") for name in names] for row in rows)
+    written = io.StringIO()
+    writer = csv.writer(written, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([row.get(name, "") for name in names] for row in rows)
+    return written.getvalue()
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, str]]:

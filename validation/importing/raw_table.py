@@ -124,10 +124,7 @@ class Layout:
         except csv.Error:
             return [line]
         if self.lists:
-            closed = sum(map(line.count, "[(")) == sum(
-                map(line.count, "])")
-            )  # else a list broke off, and its last number
-            cells = [item for cell in cells for item in (_spread(cell) if closed else [cell])]
+            cells = [item for cell in cells for item in (_spread(cell) if _closed(line) else [cell])]
         cells = [cell.strip() for cell in cells]
         return [self._ungrouped(cell) for cell in cells] if self.thousands else cells
 
@@ -177,6 +174,11 @@ class RawTable:
         return replace(self, number=self.number[rows], line=self.line[rows], texts=columns)
 
 
+def _closed(line: str) -> bool:
+    """Tell a line whose brackets are all closed; else a list broke off, perhaps within its last number."""
+    return sum(map(line.count, "[(")) == sum(map(line.count, "])"))
+
+
 def _spread(cell: str) -> list[str]:
     """Return the numbers of a list in brackets, as Python prints a list, a tuple or an array; else the cell.
 
@@ -187,7 +189,7 @@ def _spread(cell: str) -> list[str]:
     """
     text = cell.strip()
     bare = text.lstrip("[(").rstrip("])")
-    numbers = [one for one in re.split(r"[\s,]+", bare) if one]
+    numbers = [one for one in re.split(r"[\s,'\"]+", bare) if one]
     if bare == text or any(number(one, ".") is None for one in numbers):
         return [cell]
     return numbers

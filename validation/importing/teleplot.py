@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from discsim.errors import InputError
+from discsim.validation.importing.cell_texts import number
 
 __all__ = ["begins", "write_joined"]
 
@@ -39,7 +40,7 @@ def write_joined(raw: Path, target: Path) -> list[str]:
         with raw.open(encoding="utf-8-sig", errors="replace", newline="") as stream:
             lines = csv.reader(stream)
             names = next(lines)
-            rows = [row for row in lines if row]
+            rows = [row for row in lines if row and number(row[0])]
     except (OSError, csv.Error) as error:
         raise InputError.at(raw, None, f"cannot be read ({error}); expected what Teleplot wrote") from None
     records = list(_joined(rows))

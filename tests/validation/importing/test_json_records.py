@@ -80,6 +80,13 @@ def test_what_breaks_off_is_left_out_aloud(tmp_path):
     assert "1 piece that is no JSON is LEFT OUT" in found.summary()
 
 
+def test_lists_for_each_sensor_beside_a_description_are_one_log(tmp_path):
+    (tmp_path / "readme.txt").write_text("the third throw\n")
+    (tmp_path / "session.json").write_text(FORMS["a list for each sensor"]())
+    found = import_log(tmp_path)
+    assert {*found.recordings[0].samples} == set(KINDS)
+
+
 def test_a_file_for_each_sensor_beside_a_description_is_one_log(tmp_path):
     folder = tmp_path / "export"
     folder.mkdir()

@@ -95,9 +95,10 @@ def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path
             notes = write(child, folder / child.name)
         except InputError:  # a description beside the readings: it is named with what else could not be read
             _linked(child, folder / child.name)
-        else:
-            for note in notes:
-                say(note)
+            continue
+        _flattened(folder / child.name)
+        for note in notes:
+            say(note)
     for child, kind in tracks.items():
         tables = folder.parent / f"{child.name}-tables"
         tables.mkdir()
@@ -109,6 +110,14 @@ def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path
             continue
         (tables / "gps.csv").rename(folder / child.name)
     return folder
+
+
+def _flattened(tables: Path) -> None:
+    """Move the files of a folder of tables up, under its name and theirs; a table stays where it is."""
+    if tables.is_dir():
+        for table in tables.iterdir():
+            table.rename(tables.parent / f"{tables.stem}-{table.name}")
+        tables.rmdir()
 
 
 def _to_records(path: Path) -> Callable[[Path, Path], list[str]] | None:
