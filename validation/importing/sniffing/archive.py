@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
 from discsim.files import endless
-from discsim.validation.importing import json_records, teleplot
+from discsim.validation.importing import json_records, spreadsheet, teleplot
 from discsim.validation.importing.logs import kind_of, write_tables
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
@@ -121,9 +121,11 @@ def _flattened(tables: Path) -> None:
 
 
 def _to_records(path: Path) -> Callable[[Path, Path], list[str]] | None:
-    """Return what writes a text's records as a table, and what to say of them; None where it is a table as it is."""
+    """Return what writes a file's records as tables, and what to say of them; None where it is a table as it is."""
     if json_records.begins(path):
         return json_records.write_records
+    if spreadsheet.begins(path):
+        return spreadsheet.write_sheets
     return teleplot.write_joined if teleplot.begins(path) else None
 
 
