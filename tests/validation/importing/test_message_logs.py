@@ -6,7 +6,9 @@ import functools
 import struct
 import sys
 from collections.abc import Mapping
+from functools import reduce
 from importlib.util import find_spec
+from operator import xor
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.testing import assert_allclose
 from support import message_logs as made
 from support.made_logs import DEG, G0, LANDING, RELEASE, SPIN, Log, made_log
 
+from discsim.errors import InputError
 from discsim.recording import Recording, read_recording
 from discsim.validation.cli import main
 from discsim.validation.importing import import_recording, read_map
@@ -516,3 +519,25 @@ def test_the_checksum_of_a_chunk_is_held_against_what_is_in_it(tmp_path):
     recording, said = imported(tmp_path, "bit.mcap", bytes(content))
     assert "crc" in said.lower()
     assert 3.0 < recording.samples["gyroscope"].t[-1] < 5.5
+
+
+@needs_readers
+def test_a_makers_own_sentences_that_may_hold_motion_are_named_with_a_table_of_them(tmp_path):
+    """They were left out in silence, and a log of them alone was said to hold no motion."""
+
+    def sentence(text: str) -> str:
+        return f"${text}*{reduce(xor, text.encode()):02X}"
+
+    lines = [sentence(f"GTIMU,2315,{387263 + 0.01 * k:.3f},0.1,0.2,{k},0.01,0.02,1.0,38.2") for k in range(200)]
+    raw = tmp_path / "unit.log"
+    for fixes in (0, 2):
+        more = [sentence(f"GPGGA,1235{k:02d},4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,") for k in range(fixes)]
+        raw.write_text("\n".join([*more, *lines, ""]))
+        said: list[str] = []
+        try:
+            with opened(raw, said.append):
+                assert fixes
+        except InputError as error:
+            assert not fixes
+            said.append(str(error))
+        assert "GTIMU: 200 sentences that are not read; a table of them: sed -n 's/^[$]GTIMU,//p'" in " ".join(said)

@@ -8,6 +8,7 @@ the date; VTG course and speed without a time. None says how fast it climbs.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from datetime import date as Date
 from datetime import time as TimeOfDay
@@ -28,6 +29,9 @@ KNOT = 1852.0 / 3600.0
 #: A sentence: what the checksum is of, and the checksum, which one that breaks off has not. Those of VectorNav's units
 #: (VN) are no receiver's.
 _SENTENCE = re.compile(rb"\$((?!VN)(?:P[A-Z]{3}|[A-Z]{2}[A-Z0-9]{3}),[ -#%-)+-~]*)(?:\*([0-9A-Fa-f]{2}))?")
+#: Other sentences of a receiver, and cells without which one holds no readings of two sensors.
+_OF_RECEIVERS = ("GSA", "GSV", "GLL", "GNS", "GST", "GBS", "GRS", "ZDA", "DTM", "RMB", "TXT")
+_MOTION_CELLS = 6
 #: Lines of a file's beginning that are looked at.
 _LINES = 50
 
@@ -44,7 +48,24 @@ def read(raw: Path) -> Log:
     log = read_sentences(content)
     other = sum(bool(line.strip()) and not _SENTENCE.search(line) for line in content.splitlines())
     notes = [f"{other} lines are no sentences and are left out"] if other else []
+    notes += _unread(content)
     return log._replace(notes=(*log.notes, *notes), damaged=log.damaged or other > 0)
+
+
+def _unread(content: bytes) -> list[str]:
+    """Say which sentences of a maker's own may hold readings of motion: six cells and more, as often as the fixes."""
+    cells = Counter(found[1].partition(b",")[0].decode() for found in _SENTENCE.finditer(content) if _wide(found[1]))
+    fixes = max((count for name, count in cells.items() if name[2:] in SENTENCES), default=0)
+    return [
+        f"{name}: {count} sentences that are not read; a table of them: "
+        f"sed -n 's/^[$]{name},//p' FILE | sed 's/[*].*//' > imu.csv"
+        for name, count in cells.items()
+        if name[2:] not in (*SENTENCES, *_OF_RECEIVERS) and count >= max(fixes, 1)
+    ]
+
+
+def _wide(sentence: bytes) -> bool:
+    return sentence.count(b",") >= _MOTION_CELLS
 
 
 def read_sentences(content: bytes) -> Log:
