@@ -176,6 +176,7 @@ def test_an_answer_survives_its_file(tmp_path):
         assert read_answer(tmp_path / "answer.toml") == answer
 
 
+@pytest.mark.slow
 def test_kinds_of_case_have_their_shares():
     """None in a third, one effect in a third, two in a sixth, physics of no catalogue in a sixth."""
     drawn = [draw_case(seed) for seed in range(600)]
@@ -250,6 +251,7 @@ def test_a_flight_that_is_cut_short_is_recorded_no_longer():
     assert recordings(replace(case, runs=case.runs[:1], stated_releases=()))[0].end <= 1.5
 
 
+@pytest.mark.slow
 def test_an_event_happens_before_the_throw_is_over():
     """A throw of 2.07 s had an impulse after 2.18 s: an answer that no recording knew anything of."""
     for seed in (*range(20), 585025):
@@ -259,6 +261,7 @@ def test_an_event_happens_before_the_throw_is_over():
         assert item.effect.sizes["t_s"] <= LATEST * run_time(case, item.recording)
 
 
+@pytest.mark.slow
 def test_sizes_near_the_limit_are_those_of_the_case_itself():
     """Scaled by the information in these very recordings, not by that in ordinary ones."""
     for seed, plant, id in (

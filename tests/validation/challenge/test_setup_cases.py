@@ -252,6 +252,7 @@ def test_no_gyroscope_that_feels_acceleration_is_drawn_where_its_place_is_not_st
     assert bare
 
 
+@pytest.mark.slow
 def test_in_a_flight_the_air_tells_columns_apart_where_lost_samples_turn_the_phase():
     """A magnetometer that loses 1.4 % of its samples: turned by half a turn about the spin axis it costs less."""
     case = draw_case(92001, kind="setup")
@@ -260,6 +261,7 @@ def test_in_a_flight_the_air_tells_columns_apart_where_lost_samples_turn_the_pha
     assert found.effects == (case.concealed[0].effect,)
 
 
+@pytest.mark.slow
 def test_a_fault_that_other_physics_hides_from_the_sensors_relations_is_supposed_where_it_gains_most():
     """Stray iron at the ground spoils what the field says of a gyroscope whose columns are mixed up."""
     case = draw_case(93002, kind="setup")
@@ -286,6 +288,7 @@ def test_a_turned_board_is_told_by_what_all_sensors_say_though_physics_spoils_th
     assert (true.inv() * told).magnitude() < 0.1
 
 
+@pytest.mark.slow
 def test_where_the_field_alone_is_read_a_tilt_of_the_axis_and_another_field_stand_beside_each_other():
     case = draw_case(93006, kind="setup")
     assert case.concealed[1].effect.id == "rig.axis_tilt"
@@ -305,6 +308,7 @@ def test_a_late_gyroscope_that_few_relations_show_is_borne_out_by_the_air():
     assert found.value.offset_s == pytest.approx(case.concealed[0].effect.value.offset_s, abs=2e-3)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_lost_samples_of_an_accelerometer_are_no_offset_of_its_times():
     """One offset for all throws gains a fault's price by chance, and the motion follows it no better."""
     case = draw_case(511, "flight", kind="two")
@@ -322,6 +326,7 @@ def test_a_clock_by_whose_error_phases_run_away_is_no_fault_of_the_setup_and_a_h
     assert hint.value.ratio == pytest.approx(1.014078, abs=1.5e-3)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_a_rate_reference_that_pulses_contradicts_nothing_and_that_of_another_run_does():
     """A ripple of the table's speed beside a turned board."""
     case = draw_case(93087, kind="setup")

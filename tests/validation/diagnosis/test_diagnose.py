@@ -302,6 +302,7 @@ def test_a_bias_beside_a_board_that_is_turned_far_is_along_the_axes_of_the_board
     assert_found(diagnosis, hidden[1])
 
 
+@pytest.mark.slow
 def test_an_axis_that_leans_is_named_once_where_no_magnetometer_tells_north():
     """Each run had a yaw of its own then, and its own lean by it: four runs named four."""
     case = draw_case(633022)

@@ -73,6 +73,7 @@ def test_the_clock_of_an_accelerometer_is_named_beside_a_bias():
     assert {candidate.id for candidate in final.hypothesis.candidates} == {"accel.clock_rate", "gyro.bias"}
 
 
+@pytest.mark.slow
 def test_what_was_told_is_fitted_in_stated_noise():
     """Noise estimated without the clock had swallowed it: its fit stopped at once, and lost samples were named.
 

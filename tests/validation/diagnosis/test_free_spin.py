@@ -85,6 +85,7 @@ def left_by(fit: Fit) -> float:
     return float(np.mean(np.concatenate(turning) ** 2))
 
 
+@pytest.mark.slow
 def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeypatch):
     release = replace(release_of(0.4, 70.0), body_rate=np.array([2.0, -1.5, 70.0]))
     assert left_by(relaxed([spin_of_tables("cd1", release)])) < 1.2  # 700 readings: 1 +- 0.05
@@ -258,12 +259,14 @@ def test_a_kick_between_the_boundaries_of_a_wandering_motion_is_found_at_its_ins
     assert start["dr_rad_s"] == pytest.approx(size, rel=0.4)
 
 
+@pytest.mark.slow
 def test_lift_that_changes_within_the_first_turn_moves_no_accelerometer():
     """It left five times the noise in the first mean of one throw: a place of 0.1 mm was named."""
     case = draw_case(597283, "free_spin", (), "nothing")
     assert stepwise.search(SearchProblem(recordings(case))).final.hypothesis.candidates == ()
 
 
+@pytest.mark.slow
 def test_a_gyroscope_that_leans_with_the_pull_is_no_body_out_of_balance():
     """What goes with the pull is the same in all throws, and its own effect."""
     hidden = [effect("gyro.g_sensitivity", kx=2e-3, ky=-3e-3, kz=0.0)]

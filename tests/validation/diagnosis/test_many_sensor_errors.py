@@ -37,6 +37,7 @@ def run() -> Recording:
     return record(motion, module, np.random.default_rng(3), plant="rate_table", name="run", command=profile)
 
 
+@pytest.mark.slow
 def test_a_strong_ripple_and_four_errors_of_sensors_are_named_together():
     """The bias is nothing but a noise that is slow enough: noise estimated without it has swallowed it."""
     found = diagnose([[run()]], ["bench"]).diagnosis
@@ -48,6 +49,7 @@ def test_a_strong_ripple_and_four_errors_of_sensors_are_named_together():
     assert found.final.chi2_per_sample == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_scale_that_clipping_and_slow_noise_hide_is_found():
     """A plateau at the gyroscope's very range: its noise swallows the scale, until that is asked in stated noise."""
     faults = (
@@ -67,6 +69,7 @@ def test_a_scale_that_clipping_and_slow_noise_hide_is_found():
     assert named["gyro.scale"]["sz"].value == pytest.approx(0.017, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_two_plateaus_tell_three_errors_of_a_module_of_which_two_lead_near_but_not_to_the_data():
     faults = (
         effect("gyro.scale", sz=-0.0296),

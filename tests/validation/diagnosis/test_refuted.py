@@ -78,6 +78,7 @@ def test_it_stays_where_more_than_noise_is_left_without_it(monkeypatch: pytest.M
     assert named(without_refuted(with_bias(0.03, 0.03, -0.03))) == [BIAS]
 
 
+@pytest.mark.slow
 def test_what_readings_do_not_tell_but_what_the_air_is_charged_for_names_no_inertia():
     """It gained 87, of which 60 were charges that the air's stiffness changes from segment to segment."""
     found = search(SearchProblem(recordings(draw_case(627033))))

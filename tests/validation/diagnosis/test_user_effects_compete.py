@@ -282,7 +282,7 @@ def test_both_engines_and_the_pieces_of_a_fit_fly_one_wrench(tmp_path):
     assert linear.common[rows, 0][-1] == pytest.approx(-spin, rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["nonlinear", "ribbon"])
+@pytest.mark.parametrize("name", ["nonlinear", pytest.param("ribbon", marks=pytest.mark.slow)])
 def test_the_worked_examples_of_the_documents_find_what_they_hide(tmp_path, monkeypatch, capsys, name):
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```(python|sh)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)

@@ -97,7 +97,9 @@ def wait_until(condition, what: str) -> None:
         time.sleep(0.005)
 
 
-@pytest.mark.parametrize(("stop", "workers"), [(signal.SIGKILL, "2"), (signal.SIGINT, "2")])
+@pytest.mark.parametrize(
+    ("stop", "workers"), [(signal.SIGKILL, "2"), pytest.param(signal.SIGINT, "2", marks=pytest.mark.slow)]
+)
 def test_a_sweep_that_was_stopped_goes_on_and_gives_the_same_bytes(plan, undisturbed, tmp_path, capsys, stop, workers):
     out = tmp_path / "sweep"
     process = subprocess.Popen(

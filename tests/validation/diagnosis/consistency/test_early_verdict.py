@@ -110,7 +110,7 @@ def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound,
     assert left(other) > CONSISTENCY.reconciled
 
 
-@pytest.mark.parametrize("sensor", ["gyroscope", "magnetometer"])
+@pytest.mark.parametrize("sensor", [pytest.param("gyroscope", marks=pytest.mark.slow), "magnetometer"])
 def test_a_sensor_that_is_turned_in_its_board_by_a_degree_is_no_contradiction(sound, sensor):
     """Such a gyroscope shows more than 1 rad/s of the spin on its other axes: a hundred times its noise."""
     turned = [
@@ -121,7 +121,10 @@ def test_a_sensor_that_is_turned_in_its_board_by_a_degree_is_no_contradiction(so
     assert contradiction_in(turned, ()) is None
 
 
-@pytest.mark.parametrize(("order", "amplitude"), [(1.0, 0.05), (3.0, 0.6), (6.0, 1.2)])
+@pytest.mark.parametrize(
+    ("order", "amplitude"),
+    [(1.0, 0.05), pytest.param(3.0, 0.6, marks=pytest.mark.slow), pytest.param(6.0, 1.2, marks=pytest.mark.slow)],
+)
 def test_a_table_whose_speed_ripples_is_no_contradiction(order, amplitude):
     """Of a strong one the accelerometer tells, too: it and the reference each contradict a table without a ripple."""
     profile = default_profile((1000, 3000, 5000), hold=3.0)

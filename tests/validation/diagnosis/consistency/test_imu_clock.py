@@ -27,7 +27,10 @@ def counted(seed: int, chip: float | None) -> tuple[list[Recording], OwnClock]:
     return made, clock
 
 
-@pytest.mark.parametrize(("seed", "chip"), [(1, 0.0091), (11, 0.0096), (21, 0.0104)])
+@pytest.mark.parametrize(
+    ("seed", "chip"),
+    [(1, 0.0091), pytest.param(11, 0.0096, marks=pytest.mark.slow), pytest.param(21, 0.0104, marks=pytest.mark.slow)],
+)
 def test_the_wobble_tells_the_period_of_a_chip_that_free_runs(seed, chip):
     made, clock = counted(seed, chip)
     found = imu_clock_of(made, NAMES, clock)
@@ -40,7 +43,9 @@ def test_the_wobble_tells_the_period_of_a_chip_that_free_runs(seed, chip):
         assert one.left[1] < 0.5 * one.left[0]
 
 
-@pytest.mark.parametrize("seed", [1, 11, 21])
+@pytest.mark.parametrize(
+    "seed", [1, pytest.param(11, marks=pytest.mark.slow), pytest.param(21, marks=pytest.mark.slow)]
+)
 def test_a_chip_that_is_read_in_step_has_no_clock_of_its_own(seed):
     made, clock = counted(seed, None)
     found = imu_clock_of(made, NAMES, clock)

@@ -103,6 +103,7 @@ def test_a_clock_that_differs_between_recordings_is_told_as_lost_samples(ratios,
     assert (rather_lost(fitted.fit, clock) is not None) is lost
 
 
+@pytest.mark.slow
 def test_lost_samples_of_run_downs_are_named_with_their_share_and_the_clock_beside_them():
     runs = coasts(errors=[effect("accel.dropped_samples", fraction=0.03)], rates=(60.0, 40.0, 25.0), seconds=10.0)
     rows = sum(len(run.samples["accelerometer"]) for run in runs)

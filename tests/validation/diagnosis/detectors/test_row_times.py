@@ -132,6 +132,7 @@ def test_the_baseline_is_charged_for_the_field_as_it_is_written():
     assert loud > 10.0
 
 
+@pytest.mark.slow
 def test_single_samples_of_a_part_with_its_own_clock_are_named_without_means():
     single = [loop.logged(one, 1 + k, own_clock=True, weight=0.0)[0] for k, one in enumerate(loop.motions())]
     found = row_times(single, NAMES, agreement_of(single, NAMES))
@@ -152,6 +153,7 @@ def test_counts_that_no_other_sensor_bears_out_are_not_believed():
     assert row_times(logged(), NAMES, None) is None
 
 
+@pytest.mark.slow
 def test_rows_are_believed_where_their_tick_came_out_as_a_whole_period():
     agreement = agreement_of(logged(), NAMES)
     assert agreement is not None
@@ -172,7 +174,9 @@ def with_late_rows(weight: float, chip: float | None) -> RowTimes | None:
     return row_times(late, NAMES, agreement_of(late, NAMES))
 
 
-@pytest.mark.parametrize(("weight", "chip"), [(0.5, None), (0.0, None), (0.5, 0.0091)])
+@pytest.mark.parametrize(
+    ("weight", "chip"), [(0.5, None), (0.0, None), pytest.param(0.5, 0.0091, marks=pytest.mark.slow)]
+)
 def test_rows_that_came_late_are_told_from_rows_that_were_lost(weight, chip):
     found = with_late_rows(weight, chip)
     assert found is not None

@@ -32,6 +32,7 @@ def test_two_chips_that_are_turned_alike_about_the_axis_do_not_wander_off():
         assert {q.sigma for q in parameters_of(free_candidate(id))} == {0.1}
 
 
+@pytest.mark.slow
 def test_all_that_a_real_logger_did_is_named_and_nothing_else():
     case = draw_case(31003, kind="like_real")
     made = recordings(case)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from numpy.testing import assert_array_equal
 from support.made import MODULE
 
@@ -100,6 +101,7 @@ def flights(ratio: float) -> tuple[Fit, Fit]:
     return first, refit(fit, iterations=12)
 
 
+@pytest.mark.slow
 def test_a_flight_begun_in_the_time_of_a_wrong_clock_is_brought_to_its_data():
     """Its spin is at half of what it is for a while: so a start may end that knows nothing of a clock 2 % slow."""
     first, fit = flights(0.98)
@@ -113,6 +115,7 @@ def test_a_flight_begun_in_the_time_of_a_wrong_clock_is_brought_to_its_data():
     assert found.merit < 1.01 * fit.merit
 
 
+@pytest.mark.slow
 def test_a_flight_that_is_begun_in_true_time_keeps_what_was_found_of_its_readings():
     """Those that were left out, which effects compete, and samples that were lost."""
     one = flights(0.98)[0].trajectories[0]

@@ -19,6 +19,7 @@ from discsim.validation.diagnosis.selection.search_state import chi2_in, values_
 from discsim.validation.diagnosis.selection.stepwise import search
 
 
+@pytest.mark.slow
 def test_a_kick_a_turn_beside_its_instant_is_moved_there_and_one_at_its_instant_stays():
     hidden = effect("event.impulse", t_s=0.81, dv_north_m_s=-0.5, dv_east_m_s=-0.6, dv_down_m_s=0.1)
     found = search(SearchProblem(throws([hidden], only=1)))

@@ -331,6 +331,7 @@ def test_the_search_ends_where_all_further_effects_cannot_take_what_is_left(monk
     assert stepwise.past_hope(found, before, after, further) is stops
 
 
+@pytest.mark.slow
 def test_a_search_that_comes_to_more_effects_than_are_of_use_is_given_up_as_it_stands():
     """Rivals of a stack that nobody takes, and fits without each of it, are most of the time that it takes."""
     errors = [

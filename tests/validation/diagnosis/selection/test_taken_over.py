@@ -46,6 +46,7 @@ def ids(one: Search) -> list[str]:
     return [candidate.id for candidate in one.final.hypothesis.candidates]
 
 
+@pytest.mark.slow
 def test_what_was_found_is_taken_over_without_asking_for_it_again():
     again = search(SearchProblem(spins(BIAS), followed=in_halves(spins(BIAS))), anew=Anew(before=found()))
     assert ids(found()) == ids(again) == ["gyro.bias"]
@@ -59,6 +60,7 @@ def test_a_baseline_that_is_hopeless_beside_what_was_found_is_that_of_the_search
     assert again.base is found().base
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_worth_nothing_is_not_taken_over():
     begun = screened(SearchProblem(spins()))
     useless = Hypothesis((free_candidate("accel.bias"),))

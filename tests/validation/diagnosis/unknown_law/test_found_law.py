@@ -107,6 +107,7 @@ def test_a_bearing_that_holds_in_places_of_a_turn_is_a_law_of_the_rigs_own_angle
     assert np.std(rate[0]) < 0.03 * np.std(rate[1])
 
 
+@pytest.mark.slow
 def test_a_bearing_that_nearly_holds_a_rig_is_a_law_too():
     """Fitted to all of a run at once, with segments that do not hang together, it strays: neighbours part at random."""
     case = Request(624028).draw()
@@ -159,6 +160,7 @@ def test_a_field_that_seems_to_stand_still_or_to_change_sign_at_every_reading_is
     assert within(found, "w", 2.0 * np.pi * line)
 
 
+@pytest.mark.slow
 def test_a_magnetometer_that_warms_up_is_no_field_that_swings_slowly():
     """A swing has eighteen coefficients in each run and follows any drift; what it gains by them it must pay for."""
     secret = Warming("magnetometer", (3.0, -2.0, 4.0), 2.5)
@@ -270,6 +272,7 @@ def spun(secret: OffCatalogue) -> list[Recording]:
     return made
 
 
+@pytest.mark.slow
 def test_a_field_that_alternates_outside_is_told_in_free_spin():
     found = law_of(spun(MainsField(5.0, 59.9, (0.5, 0.5, -0.7))))
     assert found is not None
@@ -278,6 +281,7 @@ def test_a_field_that_alternates_outside_is_told_in_free_spin():
     assert "and 140.1" in found.swinging
 
 
+@pytest.mark.slow
 def test_a_gyroscope_that_warms_up_in_free_spin_is_a_law_of_time():
     """No model predicts a free spin's motion, so only laws about sensors are asked for."""
     found = law_of(spun(Warming("gyroscope", (-0.04, 0.05, 0.02), 0.8)))
@@ -344,6 +348,7 @@ def test_air_that_rises_about_a_place_is_a_law_of_that_place(secret: Thermal):
     )
 
 
+@pytest.mark.slow
 def test_a_side_force_in_flight_is_found_with_its_target_and_powers():
     hidden = Law("c * |V|^2.5", "force_y_N", {"c": 3e-4})
     recordings = flown(lambda disc, field, release: fly(disc, field, release, duration=2.5, law=hidden))
@@ -357,6 +362,7 @@ def test_a_side_force_in_flight_is_found_with_its_target_and_powers():
     assert law_of([replace(recordings[0], samples={"gps": recordings[0].samples["gps"]})]) is None
 
 
+@pytest.mark.slow
 def test_a_bias_that_settles_in_a_throw_is_no_bias_beside_a_sensitivity_to_force():
     """Their sum leaves noise with the memory of what settles; the law alone leaves that of the sheet."""
     found = diagnose([recordings(Request(615099).draw())[:2]], ["throws"]).diagnosis
@@ -366,6 +372,7 @@ def test_a_bias_that_settles_in_a_throw_is_no_bias_beside_a_sensitivity_to_force
     assert found.law.coefficients["tau"].value == pytest.approx(0.683, abs=2.0 * found.law.coefficients["tau"].sd)
 
 
+@pytest.mark.slow
 def test_a_bias_that_settles_in_flight_is_no_drift_beside_other_errors_of_its_sensor():
     """Three of them leave no more than noise, and the law explains more with less."""
     found = diagnose([recordings(Request(641024).draw())[:2]], ["throws"]).diagnosis
@@ -375,6 +382,7 @@ def test_a_bias_that_settles_in_flight_is_no_drift_beside_other_errors_of_its_se
     assert found.law.coefficients["tau"].value == pytest.approx(0.658, abs=2.0 * found.law.coefficients["tau"].sd)
 
 
+@pytest.mark.slow
 def test_a_play_far_from_the_data_has_its_law_before_a_stack_of_errors_is_tried(monkeypatch):
     """On a table a play looks like a lag; each further error took some of it away, for twenty minutes."""
     asked = []
@@ -391,6 +399,7 @@ def test_a_play_far_from_the_data_has_its_law_before_a_stack_of_errors_is_tried(
     assert found.law.coefficients["w"].value == pytest.approx(2.559, rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_told():
     """The pull on the accelerometer changes by a per cent while lift turns the body by what is fixed in it."""
     slides = recordings(Request(633010).draw())[:3]
@@ -405,6 +414,7 @@ def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_
     assert any("out of balance" in line for line in found.warnings)
 
 
+@pytest.mark.slow
 def test_a_disc_that_dries_is_not_explained_by_thin_air():
     """One effect on the motion leaves no more than noise, and a law gains 170 more."""
     found = diagnose([recordings(Request(636024).draw())], ["throws"]).diagnosis
