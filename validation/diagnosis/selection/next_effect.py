@@ -110,12 +110,14 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
     """Return the fit with the best two effects where it comes near the data, else None.
 
     Far from the data each of two effects alone may be fitted with numbers that serve for both. A third may do better
-    than either. Algebra about the fit that follows the data tells both at once.
+    than either. Algebra about the fit that follows the data tells both at once, but a delay and a lag alike: pairs are
+    refitted until one leaves nothing but noise.
     """
     base, noise = found.base, found.relaxed_noise
     ranked = pairs(found.relaxed_equations, found.candidates, found.own)
     sensible = [pair for pair in ranked if on_the_disc(found, pair.start)]
     chosen = sensible[: SELECTION.pairs_refitted]
+    best: ContinuousFit | None = None
     for number, pair in enumerate(chosen):
         refitting("refitting with two", " and ".join(c.id for c in pair.hypothesis.candidates), number, len(chosen))
         start = {**pair.start, **wobbles(found.relaxed_fit)}
@@ -132,9 +134,12 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
         for candidate in pair.hypothesis.candidates:
             found = _considering(found, base.score, both, candidate)
         worth = base.score - both.score > sum(map(price, pair.hypothesis.candidates))
-        if worth and possible(both) and not far(found, both):
-            return found, both
-    return found, None
+        if not worth or not possible(both) or far(found, both):
+            continue
+        best = both if best is None or both.worse_than(best) < 0.0 else best
+        if not both.unmodelled():
+            break
+    return found, best
 
 
 def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, list[Offer]]:
