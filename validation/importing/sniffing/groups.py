@@ -39,6 +39,8 @@ FEWEST_ROWS = 4
 #: What SCALED_IMU counts in whole numbers (MAVLink, common messages); ArduPilot's RAW_IMU counts the same.
 _MAVLINK = {"gyroscope": "mrad/s", "accelerometer": "mg", "magnetometer": "mgauss"}
 _PLACE = ({"lat", "latitude"}, {"lon", "lng", "long", "longitude"})
+#: a quaternion has turned where one of its numbers has changed by more: by 23 degrees at least
+_TURNED = 0.2
 _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid", "type", "name", "source", "device",
              "kind", "topic", "imu")  # fmt: skip
 
@@ -89,6 +91,25 @@ class Numbers:
             value[:, k], _ = column.numbers(self.dialect.layout.decimal)
         return value
 
+    @cached_property
+    def orientations(self) -> tuple[tuple[int, int, int, int], ...]:
+        """Four neighbours each that are the quaternion of a fused orientation: no sensor's, of length 1 as it turns.
+
+        A pull in g that a hand turns slowly has that length, too, and is told by its names.
+        """
+        found: list[tuple[int, int, int, int]] = []
+        for k in range(len(self.names) - 3):
+            four = self.values[:, k : k + 4]
+            four = four[np.isfinite(four).all(axis=1)]
+            named = sum(sensor_of(read_name(name).base) is not None for name in self.names[k : k + 4])
+            if named > 2 or len(four) < FEWEST_ROWS or (found and k <= found[-1][-1]):
+                continue
+            spans = np.ptp(four, axis=0)
+            # a column of noughts behind a pull is a button's
+            if spans.max() > _TURNED and spans[3] > 0.0 and _is_unit(four):
+                found.append((k, k + 1, k + 2, k + 3))
+        return tuple(found)
+
     def cells(self, column: int) -> CellTexts:
         """Return a column's texts."""
         return self.table.texts[column]
@@ -107,6 +128,13 @@ class Numbers:
             if (words and (called or telling > 1)) or numbered:
                 return k, few
         return None
+
+
+def _is_unit(value: FloatArray) -> bool:
+    """Tell whether rows (n, 4) have length 1: all but one in a hundred, to a unit of the second decimal place."""
+    with np.errstate(over="ignore"):
+        length = np.sqrt(np.sum(value**2, axis=1))
+    return bool(np.mean(np.abs(length - 1.0) < 0.01) >= 0.99)
 
 
 @dataclass(frozen=True)
@@ -175,7 +203,8 @@ def triples_of(numbers: Numbers, taken: Sequence[int]) -> list[Triple]:
     wheres: list[tuple[str, str] | None] = [None]
     if ids is not None:
         wheres = [(numbers.table.columns[ids[0]], value) for value in ids[1]]
-    free = [k for k in range(len(numbers.names)) if k not in taken and (ids is None or k != ids[0])]
+    apart = {*taken, *([] if ids is None else [ids[0]]), *(k for four in numbers.orientations for k in four)}
+    free = [k for k in range(len(numbers.names)) if k not in apart]
     found = []
     for where in wheres:
         by_base: dict[tuple[str, str], dict[int, int]] = defaultdict(dict)

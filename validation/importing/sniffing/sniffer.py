@@ -344,6 +344,10 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
     guessed = files[0].numbers.dialect.layout.encoding in ("cp1252", "latin-1") and not columns.isascii()
     also += "; the text is no UTF-8 and its encoding could not be told (save it as UTF-8)" * guessed
     also += "".join(f"; {asked}" for asked in missing_axes([file.numbers for file in files], (), ()))
+    for numbers in (file.numbers for file in files if file.numbers.orientations):
+        four = ", ".join(f"'{numbers.table.columns[k]}'" for k in numbers.orientations[0])
+        also += f"; {four} are an orientation that was worked out, not what a sensor read: log the gyroscope, too"
+        break
     if alone := one_axis_rate([file.numbers for file in files]):
         also += f"; {alone} (docs/importing.md)"
     return InputError.at(
