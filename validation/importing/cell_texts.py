@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["GAPS", "CellTexts", "number", "packed"]
 
@@ -110,8 +110,8 @@ class CellTexts:
         for start in range(0, self.cells.size, _BLOCK):
             yield from _strings(self.cells[start : start + _BLOCK])
 
-    def select(self, rows: BoolArray) -> CellTexts:
-        """Return the cells of some rows (n,)."""
+    def select(self, rows: BoolArray | IntArray) -> CellTexts:
+        """Return the cells of some rows, chosen (n,) or in an order (m,)."""
         return CellTexts(self.cells[rows])
 
     def equal(self, text: str) -> BoolArray:

@@ -260,7 +260,8 @@ def _layout(table: TomlTable | None) -> Layout:
     # either may be the separator as well, where numbers stand in quotes
     if len(thousands) > 1 or (thousands and thousands == decimal):
         raise table.error("thousands", f"'thousands' is '{thousands}', expected one character of its own")
-    layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands, labelled)
+    order = table.text("sorted_by", required=False) or ""
+    layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands, labelled, order)
     table.finish()
     return layout
 

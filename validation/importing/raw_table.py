@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from discsim.arrays import BoolArray, IntArray
 from discsim.errors import InputError, printable
 from discsim.validation.importing.cell_texts import CellTexts, number, packed
+from discsim.validation.importing.clock import stamp_seconds
 from discsim.validation.importing.labelled import RecordLines, labelled_cells, stamped
 from discsim.validation.importing.text_lines import TextLines
 
@@ -99,6 +100,8 @@ class Layout:
     labelled : bool
         Whether each cell has its name before it (``gx:1.0 gy:2.0``), as for Arduino's serial plotter; a record may go
         over several lines.
+    sorted_by : str
+        Column of time in whose order the rows are put, where they stand in another one; empty where they stay.
     """
 
     separator: str = ","
@@ -110,6 +113,7 @@ class Layout:
     encoding: str = "utf-8"
     thousands: str = ""
     labelled: bool = False
+    sorted_by: str = ""
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of one line, without the blanks around them."""
@@ -173,6 +177,26 @@ class RawTable:
         columns = tuple(column.select(rows) for column in self.texts)
         return replace(self, number=self.number[rows], line=self.line[rows], texts=columns)
 
+    def in_order_of(self, name: str, decimal: str) -> RawTable:
+        """Return the table with its rows in the order of a column of numbers or dates, numbered anew.
+
+        Rows at the same time stay as they stand; where most of them go back in time, that is turned round as well.
+        """
+        cells = self.column(name)
+        time, _ = cells.numbers(decimal)
+        if not np.isfinite(time).any():
+            time, _ = stamp_seconds(cells)
+        known = np.flatnonzero(np.isfinite(time))
+        if not known.size:
+            return self
+        # a row without a time stays behind the one that it stands behind
+        time = time[known[np.maximum(np.searchsorted(known, np.arange(time.size), side="right") - 1, 0)]]
+        steps = np.diff(time)
+        turned = np.arange(time.size)[:: -1 if np.sum(steps < 0.0) > np.sum(steps > 0.0) else 1]
+        order = turned[np.argsort(time[turned], kind="stable")]
+        texts = tuple(column.select(order) for column in self.texts)
+        return replace(self, line=self.line[order], texts=texts)
+
 
 def _closed(line: str) -> bool:
     """Tell a line whose brackets are all closed; else a list broke off, perhaps within its last number."""
@@ -217,7 +241,11 @@ def read_raw(path: Path, layout: Layout, repairs: RepairList) -> RawTable:
     table = rows.table(columns, header_line)
     if not len(table):
         raise InputError.at(path, None, f"no usable row; expected rows of {len(columns)} cells: {', '.join(columns)}")
-    return table
+    if not layout.sorted_by:
+        return table
+    if layout.sorted_by not in columns:
+        raise InputError.at(path, None, f"no column '{layout.sorted_by}' to put rows in order by: {', '.join(columns)}")
+    return table.in_order_of(layout.sorted_by, layout.decimal)
 
 
 class _Rows:

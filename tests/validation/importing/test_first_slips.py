@@ -133,12 +133,6 @@ def test_a_place_whose_latitude_lost_its_sign_is_asked_about_beside_the_sensors(
     assert "southern latitudes are negative" in line
 
 
-def test_rows_that_run_backwards_are_told(tmp_path):
-    columns = [("t_s", LOG.t), *three(named("g{}"), LOG.gyro / DEG)]
-    raw = write_table(tmp_path / "log.csv", [(name, values[::-1]) for name, values in columns])
-    assert "it runs BACKWARDS: turn the rows round" in import_log(raw).summary()
-
-
 def test_what_is_left_out_stands_in_the_summary(tmp_path):
     columns = [("t_s", LOG.t), *three(named("g{}"), LOG.gyro / DEG), ("batt", 4.0 + 0 * LOG.t)]
     assert "not used: batt" in import_log(write_table(tmp_path / "log.csv", columns)).summary()

@@ -416,10 +416,7 @@ def _no_time(numbers: Numbers, k: int) -> str:
     if _counts_rows(steps[np.isfinite(steps)]):
         return COUNTING
     cell = next(cell for cell in numbers.cells(k) if cell)
-    back = "; it runs BACKWARDS: turn the rows round, or all turns come in reversed" * bool(
-        np.mean(steps < 0) > ASCENDING
-    )
-    return f"tells no time here (its first cell is '{cell[:30]}'{back})"
+    return f"tells no time here (its first cell is '{cell[:30]}')"
 
 
 def _coarse(numbers: Numbers) -> tuple[str, Counted] | None:

@@ -166,6 +166,7 @@ def _layout(layout: Layout) -> list[str]:
         "thousands": layout.thousands,
         "encoding": layout.encoding,
         "comment": layout.comment,
+        "sorted_by": layout.sorted_by,
     }
     lines = [f"{key} = {_text(value)}" for key, value in keys.items() if value != getattr(plain, key)]
     lines += [f"skip_lines = {layout.skip_lines}"] * (layout.skip_lines > 0)

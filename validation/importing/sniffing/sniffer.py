@@ -51,6 +51,7 @@ from discsim.validation.importing.sniffing.own_place import own_place
 from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from discsim.validation.importing.sniffing.pull import arm, doubted, unit_by_pull
+from discsim.validation.importing.sniffing.row_order import order_of
 from discsim.validation.importing.sniffing.seen_turns import (
     OFF_FITTED,
     SeenTurns,
@@ -169,6 +170,12 @@ def _file(path: Path, *, alone: bool) -> _File:
     table = read_raw(path, dialect.layout, RepairList(REPAIRS))
     numbers = Numbers(table, dialect, alone)
     clocks = clocks_of(numbers)
+    if clocks[0].column is None and (order := order_of(numbers)) is not None:
+        layout = replace(dialect.layout, sorted_by=order.column)
+        dialect = replace(dialect, layout=layout, remarks=(*dialect.remarks, order.remark))
+        table = table.in_order_of(order.column, layout.decimal)
+        numbers = Numbers(table, dialect, alone)
+        clocks = clocks_of(numbers)
     names = table.columns
     taken = [names.index(name) for clock in clocks for name in (clock.column, clock.counter) if name is not None]
     return _File(numbers, tuple(clocks), tuple(triples_of(numbers, taken)))

@@ -1,0 +1,59 @@
+"""Rows that stand in another order than their times: an export with the newest first, or what several threads wrote.
+
+Takes a table in which no column ascends as a clock does; gives the column of time in whose order its rows belong.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.validation.importing.clock import is_stamp, stamp_seconds
+from discsim.validation.importing.sniffing.groups import Numbers
+from discsim.validation.importing.sniffing.names import is_time_name
+
+__all__ = ["RowOrder", "order_of"]
+
+#: Share of steps back by which a log runs backwards, but for where its clock was set.
+BACK = 0.99
+#: Share of steps within half of the usual one, once rows are in order, by which these are one log's. Stamps of a
+#: counter that begins anew lie between one another then: the steps of such are as those of chance, and 35 % within.
+EVEN = 0.9
+#: Rows of which an order is asked, at least.
+FEWEST = 20
+
+
+class RowOrder(NamedTuple):
+    """The column of time that rows are put in the order of, and what to say."""
+
+    column: str
+    remark: str
+
+
+def order_of(numbers: Numbers) -> RowOrder | None:
+    """Return the column of time in whose order a table's rows belong; None where none tells one."""
+    for k, name in enumerate(numbers.table.columns):
+        if not is_time_name(numbers.names[k]):
+            continue
+        value = numbers.values[:, k]
+        if not np.isfinite(value).any() and any(map(is_stamp, numbers.cells(k))):
+            value, _ = stamp_seconds(numbers.cells(k))
+        if (told := _told(value[np.isfinite(value)])) is not None:
+            return RowOrder(name, f"rows {told}: they are put in the order of '{name}'")
+    return None
+
+
+def _told(value: FloatArray) -> str | None:
+    """Return how times (n,) stand that belong in another order; None where their order is another matter."""
+    steps = np.diff(value)
+    if value.size < FEWEST or not np.any(steps < 0.0):
+        return None
+    if np.mean(steps <= 0.0) > BACK:
+        return "run BACKWARDS, the newest first"
+    ordered = np.diff(np.sort(value))
+    usual = float(np.median(ordered))
+    if usual <= 0.0 or np.mean(np.abs(ordered - usual) < 0.5 * usual) < EVEN:
+        return None
+    return f"stand out of order ({100.0 * np.mean(steps < 0.0):.2g} % of them are earlier than the one above)"
