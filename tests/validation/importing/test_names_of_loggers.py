@@ -9,6 +9,7 @@ from support.made_logs import DEG, G0, made_log, three, write_table
 
 from discsim.validation.importing.imported_log import import_log
 from discsim.validation.importing.sniffing.names import is_time_name, read_name, sensor_of
+from discsim.validation.importing.sniffing.turning import best_worth, steps_between
 
 LOG = made_log()
 
@@ -81,6 +82,16 @@ def test_a_message_s_own_stamp_is_its_time_and_not_when_it_came(tmp_path):
     columns += three([f"field.linear_acceleration.{axis}" for axis in "xyz"], LOG.accel)
     samples = import_log(write_table(tmp_path / "imu.csv", columns)).recordings[0].samples
     assert_allclose(samples["gyroscope"].t - samples["gyroscope"].t[0], LOG.t, atol=1e-6)
+
+
+def test_turns_that_are_57_times_too_small_explain_no_field():
+    """They did, with an iron of 100 000 uT: a spin of 1.2 rad between readings of the field was read in deg/s."""
+    slow = np.arange(0, len(LOG.t), 6)
+    steps = steps_between(LOG.t, LOG.gyro, LOG.t[slow], LOG.mag[slow])
+    wrong, right = (best_worth(steps, [worth]) for worth in (DEG, 1.0))
+    assert wrong is None or wrong.ratio > 0.9
+    assert right is not None
+    assert right.ratio < 0.1
 
 
 @pytest.mark.parametrize(("name", "per"), [("ms", 1000), ("header.stamp.nanosec", 10**9)])

@@ -18,6 +18,7 @@ from discsim.errors import InputError
 from discsim.files import endless
 from discsim.validation.importing import json_records, spreadsheet, teleplot
 from discsim.validation.importing.logs import kind_of, write_tables
+from discsim.validation.importing.sniffing import value_rows
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
 
@@ -65,18 +66,31 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
             for note in write_tables(logged, kind, tables):
                 say(note)
             logged = tables
-        elif logged.is_file() and (write := _to_records(logged)) is not None:
-            table = Path(place) / "records" / logged.name
-            table.parent.mkdir()
-            for note in write(logged, table):
-                say(note)
-            logged = table
+        elif logged.is_file():
+            logged = _as_records(logged, Path(place), say)
         elif logged.is_dir():
             logged = _with_tracks(logged, Path(place) / "beside" / (logged.resolve().name or "log"), say)
         try:
             yield logged
         except InputError as error:  # speaks of the archive that the user knows, not of where it was unpacked
             raise InputError(str(error).replace(str(logged), str(raw))) from None
+
+
+def _as_records(logged: Path, place: Path, say: Callable[[str], None]) -> Path:
+    """Return a file that is a table as it is, or what it holds as a table, or a folder of them, in ``place``.
+
+    The records of JSON and of a spreadsheet may be a row for each value in turn.
+    """
+    write, turn = _to_records(logged), 0
+    while write is not None:
+        table = place / f"records-{turn}" / logged.name
+        table.parent.mkdir()
+        for note in write(logged, table):
+            say(note)
+        logged, turn = table, turn + 1
+        again = turn == 1 and write is not value_rows.write_records and table.is_file() and value_rows.begins(table)
+        write = value_rows.write_records if again else None
+    return logged
 
 
 def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path:
@@ -126,6 +140,8 @@ def _to_records(path: Path) -> Callable[[Path, Path], list[str]] | None:
         return json_records.write_records
     if spreadsheet.begins(path):
         return spreadsheet.write_sheets
+    if value_rows.begins(path):
+        return value_rows.write_records
     return teleplot.write_joined if teleplot.begins(path) else None
 
 

@@ -23,6 +23,9 @@ SMALLEST, LARGEST = 0.02, 1.5
 #: Fewest steps for an answer: 3 unknowns of the offset, 48 ways of the axes, three components a step.
 FEWEST = 30
 MOST = 1500
+#: An offset is at most what is read and the size of the field, and in a turn by a radian what is read comes to half of
+#: that size: three times what is read. Turns that are 57 times too small (deg/s for rad/s) ask for more.
+OFFSET = 3.0
 #: Steps are taken from a reading to the next, and to the 4th and 16th next, where slow turns stand above the noise.
 LAGS = (1, 4, 16)
 PERMUTATIONS = tuple(
@@ -125,11 +128,13 @@ def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
     design = (np.eye(3) - rotation).reshape(-1, 3)
     inverse = np.linalg.pinv(design, rcond=1e-3)
     change = float(np.sqrt(np.mean((after - before) ** 2))) or 1.0
+    limit = OFFSET * float(np.max(np.linalg.norm(before, axis=1)))
     found: list[Fit] = []
     for way in ways:
         turned = np.einsum("nij,nj->ni", rotation, before @ way.T)
         left = (after @ way.T - turned).reshape(-1)
         offset = inverse @ left
+        offset *= min(1.0, limit / max(float(np.linalg.norm(offset)), 1e-300))
         ratio = float(np.sqrt(np.mean((left - design @ offset) ** 2))) / change
         found.append(Fit(ratio, way, worth, offset))
     return found
