@@ -243,6 +243,9 @@ def _parts_of(size: float) -> dict[str, float]:
 
 def _magnetometer_counts(size: float, what: str) -> Unit:
     fits = _parts_of(size)
+    if not fits and FIELD_WITH_IRON[0] <= 1e-3 * size <= FIELD_WITH_IRON[1]:
+        why = f"{size:.4g} ({what}) is the earth's field with iron near the sensor, and no part counts so finely"
+        return Unit("nT", 1.0, _said("magnetometer", "nT", "guess", why))
     part = min(fits or PER_UT, key=lambda part: abs(np.log(size / PER_UT[part] / MIDDLE)))
     per = PER_UT[part]
     others = ", ".join(other for other in fits if other != part)

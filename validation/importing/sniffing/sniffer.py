@@ -389,16 +389,12 @@ def _one_clock(tables: Sequence[Numbers]) -> Clock:
 
 
 def _fitted(
-    clock: Clock, fit: Fit | None, unit: Unit, found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray]
+    clock: Clock, unit: Unit, found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray]
 ) -> tuple[Clock, float]:
-    """Return a clock without stamps with the step that the gyroscope and the field's turning give, and their ratio.
-
-    ``fit`` is of the usual worths; where the step that was guessed is far off, none of them explains the field.
-    """
+    """Return a clock without stamps with the step that the gyroscope and the field's turning give, and their ratio."""
     if clock.decision.sure != "guess" or unit.decision.sure == "guess":
         return clock, 1.0
-    if fit is None or fit.ratio > TELLING:
-        fit = _turned(found, times, [float(unit.factor("rad_s") * factor) for factor in FACTORS])
+    fit = _turned(found, times, [float(unit.factor("rad_s") * factor) for factor in FACTORS])
     if fit is None or fit.ratio > TELLING:
         return clock, 1.0
     ratio = fit.worth / unit.factor("rad_s")
@@ -466,7 +462,7 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
             return _proposal(sniffed, ticks, offsets)
     notes = [*_on_time(clock, found, times, units, turns, pull), *sniffed.notes]
     if clock.column is None and "gyroscope" in units:
-        clock, slower = _fitted(clock, fit, units["gyroscope"], found, times)
+        clock, slower = _fitted(clock, units["gyroscope"], found, times)
         times = {sensor: slower * time for sensor, time in times.items()}
         notes = [*filter(None, [counter_note(clock)]), *notes]
     readings = {sensor: _in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}

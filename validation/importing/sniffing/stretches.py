@@ -35,6 +35,9 @@ ONE_AXIS = 0.9
 IMPACT = 0.5
 #: Soft iron and a turn that is not about z make an ellipse of the field's circle; one three times as long is no spin.
 LONGEST_ELLIPSE = 3.0
+#: ... and one that shows less than this share of a gyroscope's limit is read too seldom: noise, and what is left of the
+#: stretch below the limit, come to less.
+SLOWER = 0.8
 #: A magnetometer alone tells the rate from the field's turning over this span, s.
 FIELD_SPAN = 0.25
 
@@ -109,17 +112,18 @@ def stretches(read: RawReadings) -> list[Stretch]:
 def _spin(seen: _Rate, field: _Rate | None, start: float, end: float) -> tuple[str, float, bool]:
     """Return who shows the spin of a stretch, its size (rad/s), and whether it is more than that.
 
-    A gyroscope that stands at its limit for half the stretch gives way to the magnetometer.
+    A gyroscope that stands at its limit for half the stretch gives way to the magnetometer, unless that shows a slower
+    spin: read less than twice a turn, a field seems to turn more slowly than it does.
     """
-    for one in (seen, field):
-        if one is None:
-            continue
-        inside = (one.t >= start) & (one.t <= end)
-        spin = one.spin(inside) if inside.any() else 0.0
-        if spin > 0 and not np.mean(one.clipped[inside]) > 0.5:
-            return one.sensor, spin, False
     inside = (seen.t >= start) & (seen.t <= end)
-    return seen.sensor, seen.spin(inside), True
+    least = seen.spin(inside)
+    if least > 0 and not np.mean(seen.clipped[inside]) > 0.5:
+        return seen.sensor, least, False
+    if field is not None and (there := (field.t >= start) & (field.t <= end)).any():
+        spin = field.spin(there)
+        if spin > SLOWER * least:
+            return field.sensor, spin, False
+    return seen.sensor, least, True
 
 
 def _gyroscope_rate(read: RawReadings) -> _Rate | None:

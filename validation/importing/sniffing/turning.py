@@ -26,6 +26,8 @@ MOST = 1500
 #: An offset is at most what is read and the size of the field, and in a turn by a radian what is read comes to half of
 #: that size: three times what is read. Turns that are 57 times too small (deg/s for rad/s) ask for more.
 OFFSET = 3.0
+#: What a factor of e in the size of the vector counts as, of its changes left.
+OF_SIZE = 0.35
 #: Steps are taken from a reading to the next, and to the 4th and 16th next, where slow turns stand above the noise.
 LAGS = (1, 4, 16)
 PERMUTATIONS = tuple(
@@ -52,7 +54,8 @@ class Steps:
 class Fit(NamedTuple):
     """What is left of the vector's changes (a ratio: 0 all explained, 1 nothing), by which axes, worth, offset.
 
-    ``overall`` is the geometric mean of what is left over all of `LAGS`, by which ways are ranked.
+    ``overall`` is the geometric mean of what is left over all of `LAGS`, by which ways are ranked. ``size`` is that of
+    the vector without its offset, over that of what is read.
     """
 
     ratio: float
@@ -60,6 +63,16 @@ class Fit(NamedTuple):
     worth: float
     offset: FloatArray
     overall: float = float("nan")
+    size: float = 1.0
+
+    @property
+    def doubt(self) -> float:
+        """What is left, and beside it how far the offset takes the vector's size from what is read.
+
+        Small turns tell the product of a worth and of that size alone: half the worth explains as much with twice the
+        field. A factor of two in it counts as a quarter of the changes left, so that large turns decide by themselves.
+        """
+        return float(np.hypot(self.ratio, OF_SIZE * np.log(self.size)))
 
 
 def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, vector: FloatArray) -> list[Steps]:
@@ -128,7 +141,8 @@ def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
     design = (np.eye(3) - rotation).reshape(-1, 3)
     inverse = np.linalg.pinv(design, rcond=1e-3)
     change = float(np.sqrt(np.mean((after - before) ** 2))) or 1.0
-    limit = OFFSET * float(np.max(np.linalg.norm(before, axis=1)))
+    sizes = np.linalg.norm(before, axis=1)
+    limit, usual = OFFSET * float(np.max(sizes)), float(np.median(sizes)) or 1.0
     found: list[Fit] = []
     for way in ways:
         turned = np.einsum("nij,nj->ni", rotation, before @ way.T)
@@ -136,7 +150,8 @@ def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
         offset = inverse @ left
         offset *= min(1.0, limit / max(float(np.linalg.norm(offset)), 1e-300))
         ratio = float(np.sqrt(np.mean((left - design @ offset) ** 2))) / change
-        found.append(Fit(ratio, way, worth, offset))
+        size = float(np.median(np.linalg.norm(before @ way.T - offset, axis=1))) / usual
+        found.append(Fit(ratio, way, worth, offset, size=max(size, 1e-6)))
     return found
 
 
@@ -145,18 +160,18 @@ def best_worth(steps: Sequence[Steps], worths: Sequence[float]) -> Fit | None:
     fits = [(fit, one) for one in steps for worth in worths for fit in _fits(one, worth, PERMUTATIONS)]
     if not fits:
         return None
-    best, those = min(fits, key=lambda pair: pair[0].ratio)
+    best, those = min(fits, key=lambda pair: pair[0].doubt)
     low, high = np.log(best.worth) - 0.7, np.log(best.worth) + 0.7
     golden = (np.sqrt(5) - 1) / 2
     for _ in range(12):  # to 0.4 %
         lower, upper = high - golden * (high - low), low + golden * (high - low)
         left = [
-            min((fit.ratio for fit in _fits(those, float(np.exp(tried)), [best.axes])), default=2.0)
+            min((fit.doubt for fit in _fits(those, float(np.exp(tried)), [best.axes])), default=2.0)
             for tried in (lower, upper)
         ]
         low, high = (low, upper) if left[0] < left[1] else (lower, high)
     refined = _fits(those, float(np.exp((low + high) / 2)), [best.axes])
-    return min([best, *refined], key=lambda fit: fit.ratio)
+    return min([best, *refined], key=lambda fit: fit.doubt)
 
 
 def left_by(steps: Sequence[Steps], worth: float) -> float | None:
