@@ -21,13 +21,15 @@ from discsim.validation.importing.sniffing.magnitudes import PER_DEG_S, Unit, gr
 from discsim.validation.importing.sniffing.pull import POSSIBLE
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, left_by, steps_between
 
-__all__ = ["OFF_FITTED", "SeenTurns", "clock_note", "rate_note", "seen_turns", "ticking"]
+__all__ = ["OFF_FITTED", "OFF_LOOSE", "SeenTurns", "clock_note", "rate_note", "seen_turns", "ticking"]
 
 #: A hand holds it where the specific force is gravity to this share: it moves what it turns by less than 1 m/s^2.
 HELD = 0.1
 #: What a step from the gyroscope's rate and the field's turning may be off by, a share (one sigma): a gyroscope's scale
 #: (3 % over parts and temperature), and what was found on four measured logs (1 to 6 %, rms 3 %).
 OFF_FITTED = 0.04
+#: ... and where small turns alone tell it: made logs, clipped for most of a throw, were 11 to 26 % off.
+OFF_LOOSE = 0.2
 #: How often too large a step of the stamps may be: a tick of 0.1 ms, 10 ms or 100 us that is taken for another unit.
 TICKS = (10.0, 0.1, 100.0, 0.01, 1000.0, 0.001)
 #: A ratio is a power of ten where it is one to this factor: a clock that is off by 30 % is the worst known.

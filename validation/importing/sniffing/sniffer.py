@@ -54,6 +54,7 @@ from discsim.validation.importing.sniffing.pull import arm, doubted, unit_by_pul
 from discsim.validation.importing.sniffing.row_order import order_of
 from discsim.validation.importing.sniffing.seen_turns import (
     OFF_FITTED,
+    OFF_LOOSE,
     SeenTurns,
     clock_note,
     rate_note,
@@ -406,8 +407,9 @@ def _fitted(
     none = clock.decision.why.partition("; rows taken as")[0]
     why = f"{none}; with this step the field turns as fast as the gyroscope says ({unit.unit})"
     why += f"; '{clock.counter}' counts the rows" * bool(clock.counter)
-    told = Decision("time", f"{step} s a row", "likely", why)
-    return clock.with_step(step, told, OFF_FITTED), step / clock.step
+    why += "; only small turns tell it, to a fifth or so: state step_s" * (not fit.sharp)
+    told = Decision("time", f"{step} s a row", "likely" if fit.sharp else "guess", why)
+    return clock.with_step(step, told, OFF_FITTED if fit.sharp else OFF_LOOSE), step / clock.step
 
 
 # -------------------------------------------------------------------------------------------------- proposal

@@ -26,8 +26,12 @@ MOST = 1500
 #: An offset is at most what is read and the size of the field, and in a turn by a radian what is read comes to half of
 #: that size: three times what is read. Turns that are 57 times too small (deg/s for rad/s) ask for more.
 OFFSET = 3.0
-#: What a factor of e in the size of the vector counts as, of its changes left.
-OF_SIZE = 0.35
+#: What a worth that is a quarter off has to leave of the changes, as a multiple of what the best leaves: turns by a
+#: radian leave 0.2, beside 0.05 to 0.1 of noise.
+SHARP = 1.5
+#: What iron makes of the size of what is read, a factor of 1.5 (one sigma), as its logarithm; and how much that counts:
+#: as a quarter of the logarithm of what is left, for axes and times that are off leave most of it, and not noise.
+OF_SIZE = 0.25 / (2 * np.log(1.5) ** 2)
 #: Steps are taken from a reading to the next, and to the 4th and 16th next, where slow turns stand above the noise.
 LAGS = (1, 4, 16)
 PERMUTATIONS = tuple(
@@ -55,7 +59,8 @@ class Fit(NamedTuple):
     """What is left of the vector's changes (a ratio: 0 all explained, 1 nothing), by which axes, worth, offset.
 
     ``overall`` is the geometric mean of what is left over all of `LAGS`, by which ways are ranked. ``size`` is that of
-    the vector without its offset, over that of what is read.
+    the vector without its offset, over that of what is read. ``sharp``: by the turns alone a worth that is a quarter
+    larger or smaller explains much less; else it rests on that size.
     """
 
     ratio: float
@@ -64,15 +69,16 @@ class Fit(NamedTuple):
     offset: FloatArray
     overall: float = float("nan")
     size: float = 1.0
+    sharp: bool = True
 
     @property
     def doubt(self) -> float:
         """What is left, and beside it how far the offset takes the vector's size from what is read.
 
         Small turns tell the product of a worth and of that size alone: half the worth explains as much with twice the
-        field. A factor of two in it counts as a quarter of the changes left, so that large turns decide by themselves.
+        field. A factor of two counts as half as much again that is left, so that large turns decide by themselves.
         """
-        return float(np.hypot(self.ratio, OF_SIZE * np.log(self.size)))
+        return float(self.ratio * np.exp(OF_SIZE * np.log(self.size) ** 2))
 
 
 def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, vector: FloatArray) -> list[Steps]:
@@ -171,7 +177,9 @@ def best_worth(steps: Sequence[Steps], worths: Sequence[float]) -> Fit | None:
         ]
         low, high = (low, upper) if left[0] < left[1] else (lower, high)
     refined = _fits(those, float(np.exp((low + high) / 2)), [best.axes])
-    return min([best, *refined], key=lambda fit: fit.doubt)
+    best = min([best, *refined], key=lambda fit: fit.doubt)
+    beside = [fit.ratio for factor in (0.8, 1.25) for fit in _fits(those, factor * best.worth, [best.axes])]
+    return best._replace(sharp=len(beside) == 2 and min(beside) > SHARP * best.ratio)
 
 
 def left_by(steps: Sequence[Steps], worth: float) -> float | None:
