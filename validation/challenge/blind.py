@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -12,6 +14,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+
+if sys.platform == "linux":
+    import resource
 
 from discsim.errors import InputError
 from discsim.files import digest, write_text
@@ -26,8 +31,10 @@ __all__ = ["DIAGNOSE", "Request", "diagnose_blind", "open_answers", "seal_answer
 DIAGNOSE = (sys.executable, "-m", "discsim.validation.cli", "diagnose")
 #: what a diagnosis gets of the environment: where programs and compiled code are, how many threads it may use
 _PASSED_ON = ("PATH", "HOME", "LANG", "TMPDIR", "NUMBA_CACHE_DIR", "OMP_NUM_THREADS", "VIRTUAL_ENV")
-#: a diagnosis that takes longer has failed, s
+#: a diagnosis that takes longer has failed, s of the processors: other work may take these from it for hours ...
 PATIENCE_S = 1800.0
+#: ... but by the clock no longer than this many times as much
+BUSY = 10.0
 
 
 class Request(NamedTuple):
@@ -91,6 +98,34 @@ def open_answers(requests: Sequence[Request], out: Path) -> list[Answer]:
     return answers
 
 
+def _run(command: Sequence[str], desk: Path) -> str | None:
+    """Run a command in a folder and a bare environment; return what went wrong, None where nothing did."""
+    with subprocess.Popen(
+        command,
+        cwd=desk,
+        env={name: os.environ[name] for name in _PASSED_ON if name in os.environ},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        longest = PATIENCE_S
+        if sys.platform == "linux":
+            with contextlib.suppress(ProcessLookupError):
+                resource.prlimit(process.pid, resource.RLIMIT_CPU, (int(PATIENCE_S), int(PATIENCE_S) + 5))
+            longest = BUSY * PATIENCE_S
+        try:
+            _, said = process.communicate(timeout=longest)
+        except BaseException as stopped:
+            process.kill()
+            if isinstance(stopped, subprocess.TimeoutExpired):
+                return f"no answer within {longest:g} s"
+            raise
+    if sys.platform == "linux" and process.returncode == -signal.SIGXCPU:
+        return f"no answer within {PATIENCE_S:g} s of the processors"
+    return None if process.returncode == 0 else f"exit status {process.returncode}: {said.strip()[-600:]}"
+
+
 def diagnose_blind(request: tuple[Any, ...], command: Sequence[str] | None) -> dict[str, Any]:
     """Conceal a case in a folder of its own, let another process diagnose it, and return what that wrote.
 
@@ -105,22 +140,7 @@ def diagnose_blind(request: tuple[Any, ...], command: Sequence[str] | None) -> d
         write_recordings(case, dataset)
         fingerprint = digest(dataset)
         started, before = time.monotonic(), os.times()
-        error = None
-        try:
-            done = subprocess.run(
-                [*(command or DIAGNOSE), str(dataset), "--out", str(out)],
-                cwd=desk,
-                env={name: os.environ[name] for name in _PASSED_ON if name in os.environ},
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                timeout=PATIENCE_S,
-                check=False,
-            )
-            if done.returncode != 0:
-                error = f"exit status {done.returncode}: {done.stderr.strip()[-600:]}"
-        except subprocess.TimeoutExpired:
-            error = f"no answer within {PATIENCE_S:g} s"
+        error = _run([*(command or DIAGNOSE), str(dataset), "--out", str(out)], desk)
         seconds, after = round(time.monotonic() - started, 2), os.times()
         cpu = after.children_user + after.children_system - before.children_user - before.children_system
         diagnosis = None

@@ -15,6 +15,7 @@ from scipy.stats import binom
 from discsim.effects.catalogue import effect
 from discsim.errors import InputError
 from discsim.files import model_file
+from discsim.validation.challenge import blind
 from discsim.validation.challenge.blind import Request, diagnose_blind, open_answers, seal_answers
 from discsim.validation.challenge.cases.case import Concealed
 from discsim.validation.challenge.cases.conceal import Answer
@@ -412,6 +413,23 @@ def test_a_diagnosis_gets_recordings_and_nothing_else(spy, monkeypatch):
 def test_a_diagnosis_that_fails_is_a_failure_with_its_message(script, fault):
     result = diagnose_blind(tuple(Request(8, "flight", (), "nothing")), [sys.executable, "-c", script])
     assert result["diagnosis"] is None
+    assert fault in result["error"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits another process's processor time")
+@pytest.mark.parametrize(
+    ("script", "fault"),
+    [
+        ("while True: pass", "no answer within 1 s of the processors"),
+        ("import time; time.sleep(1.5)", "no diagnosis.json that can be read"),
+        ("import time; time.sleep(60)", "no answer within 3 s"),
+    ],
+)
+def test_a_diagnosis_is_waited_for_by_the_time_that_it_works(monkeypatch, script, fault):
+    """Beside other work a case of 58 s of processor time had no answer within 1800 s by the clock."""
+    monkeypatch.setattr(blind, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(blind, "BUSY", 3.0)
+    result = diagnose_blind(tuple(Request(8, "flight", (), "nothing")), [sys.executable, "-c", script])
     assert fault in result["error"]
 
 
