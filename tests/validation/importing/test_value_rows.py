@@ -24,10 +24,10 @@ def values(apart: float = 0.0):
             yield t + k * apart, name, f"{cell:.5f}"
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_values_at_one_time_are_a_record(tmp_path, separator):
+@pytest.mark.parametrize(("separator", "point"), [(",", "."), (";", "."), ("\t", "."), (";", ",")])
+def test_values_at_one_time_are_a_record(tmp_path, separator, point):
     raw = tmp_path / "log.csv"
-    lines = [f"{t:.4f}{separator}{name}{separator}{cell}" for t, name, cell in values()]
+    lines = [f"{t:.4f}{separator}{name}{separator}{cell}".replace(".", point) for t, name, cell in values()]
     raw.write_text("\n".join([separator.join(["time_s", "name", "value"]), *lines, ""]))
     log = import_log(raw)
     read = log.recordings[0].samples["gyroscope"]

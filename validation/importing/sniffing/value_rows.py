@@ -27,8 +27,8 @@ _NAMES = ("device", "deviceid", "measurement", "entityid", "topic", "sensor", "s
 _SPAN = {"start", "stop"}
 #: Names of values at most: more are no sensors' axes.
 MOST = 100
-#: Bytes of a table that is read whole.
-MAX_BYTES = 1 << 30
+#: Bytes of a table that is read whole, and of a header at most.
+MAX_BYTES, LONGEST = 1 << 30, 1 << 16
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,16 @@ class _Layout:
     names: tuple[int, ...]
 
     def row(self, cells: Sequence[str]) -> tuple[str, str, str] | None:
-        """Return the time, name and value of a row; None for what is none."""
-        if len(cells) <= max(self.time, self.value, *self.names) or number(cells[self.value].strip()) is None:
+        """Return the time, name and value of a row, numbers with a point; None for what is none."""
+        if len(cells) <= max(self.time, self.value, *self.names):
             return None
-        return cells[self.time].strip(), self.name_of(cells), cells[self.value].strip()
+        time, value = (self._pointed(cells[k].strip()) for k in (self.time, self.value))
+        return None if number(value) is None else (time, self.name_of(cells), value)
+
+    def _pointed(self, cell: str) -> str:
+        """Return a cell with a decimal comma as one with a point: where commas part no cells."""
+        pointed = cell.replace(",", ".")
+        return pointed if self.separator != "," and number(pointed) is not None else cell
 
     def name_of(self, cells: Sequence[str] | Mapping[int, str]) -> str:
         """Return the name of a row's value; of a topic the last level is the name."""
@@ -62,8 +68,9 @@ def _layout(path: Path) -> _Layout | None:
     """Return where a table with one value a row has what; None where it is none. Fields may stand below one another."""
     try:
         with path.open("rb") as stream:
-            if b"\0" in stream.read(1 << 12):
-                return None
+            head = stream.read(LONGEST)
+        if b"\0" in head or b"\n" not in head:
+            return None
         with path.open(encoding="utf-8-sig", errors="replace", newline="") as stream:
             lines = (line for line in stream if line.strip() and not line.startswith("#"))
             header = next(lines, "")
@@ -106,7 +113,7 @@ def write_records(raw: Path, target: Path) -> list[str]:
     """Write the records of a table as ``target``, and return what to say.
 
     Values at one time are a record. Where each has a time of its own a record goes on until a name comes again, and has
-    the time of its first. Raises `InputError` for a table that is too large, and one without times.
+    the time of its first. Raises `InputError` for a table that is too large.
     """
     layout, size = _layout(raw), raw.stat().st_size
     if layout is None or size > MAX_BYTES:
