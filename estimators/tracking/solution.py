@@ -120,7 +120,9 @@ def solve(
 ) -> tuple[Point, Linear, FloatArray]:
     """Gauss-Newton with damping until a step is worth less than a hundredth of a standard deviation.
 
-    The linearisation returned is the one from which the last step was taken.
+    What second differences are expected to be follows the spin, and a step is judged by what they are after it: where
+    they hold closely (a decay that is exponential all but exactly) others lead away for good. The linearisation
+    returned is the one from which the last step was taken.
     """
     precision, mean = problem.prior(precession)
     target = problem.bend_expected(point.x)
@@ -131,10 +133,10 @@ def solve(
         information[np.diag_indices_from(information)] *= 1.0 + damping
         step = cho_solve(cho_factor(information), right)
         trial = Point(problem, point.x + step, point.weights)
-        gap = _gap(problem, trial.x, target)
+        expected = problem.bend_expected(trial.x)
+        gap = _gap(problem, trial.x, expected)
         if _cost(trial, noise, precision, mean) + float(gap @ gap) / roughness <= cost + 1e-9:
-            point = trial
-            target = problem.bend_expected(point.x)
+            point, target = trial, expected
             damping = 0.0 if damping < 1e-4 else damping * 0.1
             if float(step @ right) < 1e-4:
                 break
