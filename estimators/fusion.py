@@ -9,7 +9,7 @@ averaged with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -31,6 +31,7 @@ __all__ = [
     "compare_sensors",
     "contradictions",
     "fusion",
+    "mostly_clipped",
     "unfolding",
 ]
 
@@ -314,53 +315,30 @@ def contradictions(recording: Recording) -> list[str]:
     return [str(agreement) for agreement in compare_sensors(recording) if not agreement.agrees]
 
 
+@remembered
 def unfolding(recording: Recording, settings: FusionSettings | None = None) -> tuple[int, bool]:
     """Tell how many whole turns per sampling interval the magnetometer misses, and whether that is known.
 
     Above half its sampling rate the field shows r - 2 pi f_s k. The gyroscope's z, or the centripetal force, tells k;
-    a clipped one only bounds it. Without another sensor k is taken as zero, as far as that is known; where a sensor
-    excludes zero and cannot choose among the rest the answer is unknown.
+    a clipped one only bounds it, and then a free spin has to slow down, too. Without another sensor k is taken as zero,
+    as far as that is known; where a sensor excludes zero and cannot choose among the rest the answer is unknown.
     """
     settings = settings or FusionSettings()
     magnetometer = recording.need("magnetometer")
     if len(magnetometer) < 16:
         return 0, True
     fold = 2 * np.pi / magnetometer.interval
-    plain = tracks_of(recording, replace(settings.tracking, knots=0.4), unfold=0) if _may_fold(recording, fold) else []
+    outside = _may_fold(recording, fold)
+    sought = outside or mostly_clipped(recording)
+    plain = tracks_of(recording, replace(settings.tracking, knots=0.4), unfold=0) if sought else []
     if not plain:
         return 0, True
-    rates = np.concatenate([track.rate for track in plain])
-    middle = float(np.median(rates))
-    candidates = [k for k in (0, -1, 1, -2, 2)]
-    votes: list[set[int]] = []
-    gyroscope, accelerometer = recording.get("gyroscope"), recording.get("accelerometer")
-    if gyroscope is not None:
-        z = gyroscope.value[:, 2]
-        clipped = recording.sheets["gyroscope"].clipped(gyroscope.value)[np.isfinite(z), 2]
-        z = z[np.isfinite(z)]
-        if z.size:
-            level = float(np.median(z))
-            if np.mean(clipped) < 0.5:
-                votes.append({k for k in candidates if abs(middle + k * fold - level) < 0.1 * fold})
-            else:
-                votes.append({k for k in candidates if (middle + k * fold) * np.sign(level) > 0.9 * abs(level)})
-    if accelerometer is not None:
-        sheet = recording.sheets["accelerometer"]
-        radius = float(np.hypot(*sheet.position[:2])) if sheet.position is not None else 0.0
-        if radius > 1e-4:
-            clipped = np.any(sheet.clipped(accelerometer.value)[:, :2], axis=1)
-            present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
-            clipped, value = clipped[present], accelerometer.value[present, :2]
-            force = float(np.hypot(*np.mean(value, axis=0))) if len(value) else 0.0
-            seen = np.sqrt(force / radius)
-            bias = settings.accelerometer_bias + 0.05 * force
-            low = np.sqrt(max(force - 3 * bias, 0.0) / (radius + 2 * settings.mount))
-            high = np.sqrt((force + 3 * bias) / max(radius - 2 * settings.mount, 0.2 * radius))
-            if np.any(present) and np.mean(clipped) > 0.05:
-                high = np.inf
-            if seen > 0:
-                votes.append({k for k in candidates if low <= abs(middle + k * fold) <= high})
-    possible = set(candidates)
+    middle = float(np.median(np.concatenate([track.rate for track in plain])))
+    rates = {k: middle + k * fold for k in (0, -1, 1, -2, 2)}
+    votes = _by_gyroscope(recording, rates, fold, max(plain, key=lambda track: len(track.t)))
+    # a mount that is wrong shows any rate: it is asked where it shows one that the field cannot
+    votes += _by_pull(recording, rates, settings) if outside else []
+    possible = set(rates)
     for vote in votes:
         possible &= vote
     if not votes or 0 in possible:
@@ -368,6 +346,62 @@ def unfolding(recording: Recording, settings: FusionSettings | None = None) -> t
     if len(possible) == 1:
         return possible.pop(), True
     return 0, False
+
+
+def _by_gyroscope(recording: Recording, rates: Mapping[int, float], fold: float, track: Track) -> list[set[int]]:
+    """Return which of some rates (rad/s, by their k) a gyroscope's z allows, and where it is clipped a free spin."""
+    gyroscope = recording.get("gyroscope")
+    if gyroscope is None:
+        return []
+    z = gyroscope.value[:, 2]
+    clipped = recording.sheets["gyroscope"].clipped(gyroscope.value)[np.isfinite(z), 2]
+    z = z[np.isfinite(z)]
+    if not z.size:
+        return []
+    level = float(np.median(z))
+    if np.mean(clipped) < 0.5:
+        return [{k for k, rate in rates.items() if abs(rate - level) < 0.1 * fold}]
+    votes = [{k for k, rate in rates.items() if rate * np.sign(level) > 0.9 * abs(level)}]
+    return [*votes, _slowing(track, rates)] if recording.plant in ("flight", "free_spin") else votes
+
+
+def _by_pull(recording: Recording, rates: Mapping[int, float], settings: FusionSettings) -> list[set[int]]:
+    """Return which of some rates (rad/s, by their k) the centripetal force at a known place allows."""
+    accelerometer = recording.get("accelerometer")
+    if accelerometer is None:
+        return []
+    sheet = recording.sheets["accelerometer"]
+    radius = float(np.hypot(*sheet.position[:2])) if sheet.position is not None else 0.0
+    present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
+    if not radius > 1e-4 or not np.any(present):
+        return []
+    clipped = np.any(sheet.clipped(accelerometer.value)[present, :2], axis=1)
+    force = float(np.hypot(*np.mean(accelerometer.value[present, :2], axis=0)))
+    bias = settings.accelerometer_bias + 0.05 * force
+    low = np.sqrt(max(force - 3 * bias, 0.0) / (radius + 2 * settings.mount))
+    high = np.sqrt((force + 3 * bias) / max(radius - 2 * settings.mount, 0.2 * radius))
+    high = np.inf if np.mean(clipped) > 0.05 else high
+    return [{k for k, rate in rates.items() if low <= abs(rate) <= high}] if force > 0 else []
+
+
+#: No disc is thrown with more spin, rad/s (docs/checking.md). A free spin slows down, but
+#: with a time constant above two seconds, and what grows by less than this share in a second may be steady.
+FASTEST, STEEPEST, STEADY = 200.0, 0.5, 0.02
+
+
+def _slowing(track: Track, rates: Mapping[int, float]) -> set[int]:
+    """Return which of some rates at the middle of a track (rad/s, by their k) are those of a free spin that slows."""
+    slope = float(np.polyfit(track.t, track.rate, 1)[0]) if len(track.t) > 2 else 0.0
+    change = {k: slope / rate for k, rate in rates.items() if 0.0 < abs(rate) < FASTEST}
+    return {k for k, share in change.items() if -STEEPEST < share < STEADY}
+
+
+def mostly_clipped(recording: Recording) -> bool:
+    """Tell a gyroscope whose z stands at its limit in more than half of its readings: it bounds the spin alone."""
+    gyroscope = recording.get("gyroscope")
+    if gyroscope is None:
+        return False
+    return bool(np.mean(recording.sheets["gyroscope"].clipped(gyroscope.value)[:, 2]) > 0.5)
 
 
 def _may_fold(recording: Recording, fold: float) -> bool:

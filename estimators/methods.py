@@ -13,7 +13,14 @@ from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError, require_type
 from discsim.estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from discsim.estimators.fft import FftSettings, fft
-from discsim.estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
+from discsim.estimators.fusion import (
+    accelerometer_calibrated,
+    compare_sensors,
+    contradictions,
+    fusion,
+    mostly_clipped,
+    unfolding,
+)
 from discsim.estimators.gyroscope import gyroscope, rate_reference
 from discsim.estimators.likelihood import likelihood
 from discsim.estimators.rate import YawRate
@@ -52,6 +59,8 @@ DOUBTED_BY = MappingProxyType(
     }
 )
 
+#: Methods that know the rate by the field's turning alone.
+BY_THE_FIELD = ("tracking", "likelihood", "fft")
 #: The methods whose rate is a turning of the field over time: a wrong spacing of the rows scales it.
 BY_THE_CLOCK = ("fusion", "tracking", "likelihood", "fft", "accelerometer_calibrated")
 
@@ -210,6 +219,20 @@ def _estimate(sound: Usable, name: str, options: Options) -> YawRate:
     return replace(found, rate=rate, sd=sd)
 
 
+def _folded(recording: Recording, name: str) -> str:
+    """Return why a method shows another rate than the spin's, by a gyroscope's limit; empty where it may show that.
+
+    What a gyroscope in range says is told beside the rates (`folding_notes`).
+    """
+    if name not in BY_THE_FIELD or not mostly_clipped(recording) or unfolding(recording) == (0, True):
+        return ""
+    rate = 1.0 / recording.need("magnetometer").interval
+    return (
+        f"by the limit of the gyroscope it spins faster than {rate:.3g} readings of a field in a second show: beyond "
+        "half of them it seems to turn more slowly, or the other way"
+    )
+
+
 def _clocked(found: YawRate, recording: Recording) -> YawRate:
     """Return a rate that goes by the magnetometer's time with what its sampling rate is stated to be off by."""
     sheet = recording.sheets.get("magnetometer")
@@ -276,6 +299,9 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
             candidate = _estimate(sound, name, options)
         except InputError as error:
             reasons[name] = str(error)
+            continue
+        if told := _folded(sound.recording, name):
+            reasons[name] = told
             continue
         share = float(np.mean(np.isfinite(candidate.rate))) if len(candidate) else 0.0
         if share >= ENOUGH:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from support.spinning_sensor import MPU9250, Faults, Spin, move, record, without
 
+from discsim.errors import InputError
+from discsim.estimators import estimate
 from discsim.estimators.centripetal import centripetal
 from discsim.estimators.fusion import (
     FusionSettings,
@@ -303,3 +305,29 @@ def test_a_decay_that_is_exponential_all_but_exactly_leads_no_fit_away(seed):
     assert np.mean(known) > 0.9
     # five standard deviations of what the field of 41 readings tells
     assert np.median(np.abs(found.rate[known] - truth.r(found.t[known]))) < np.radians(1.0)
+
+
+def beyond_the_gyroscope(rate_hz: float, decay: float = 8.0):
+    """A spin of 5000 deg/s, beyond a gyroscope's 2000 deg/s, with a magnetometer of a few readings a second."""
+    spin = Spin(rate=5000.0, decay=decay, decay_change=0.0, duration=4.0, nutation=0.0)
+    sheets = {"magnetometer": SensorSheet(rate_hz, 0.4, 0.01, 4912.0), "gyroscope": MPU9250["gyroscope"]}
+    return record(spin, np.random.default_rng(2), sheets=sheets, sensors=tuple(sheets), plant="free_spin")
+
+
+def test_a_free_spin_beyond_the_gyroscope_that_seems_to_quicken_the_other_way_is_unfolded():
+    """87 rad/s at 25 readings a second look like -70 rad/s that grow, which no air does."""
+    told, truth = beyond_the_gyroscope(25.0, decay=60.0)
+    assert unfolding(told) == (1, True)
+    found = fusion(told)
+    known = np.isfinite(found.rate)
+    assert np.mean(known) > 0.9
+    assert np.median(np.abs(found.rate[known] - truth.r(found.t[known]))) < np.radians(3.0)
+
+
+def test_where_two_spins_are_beyond_the_gyroscope_none_of_them_is_told():
+    """At 12.5 readings a second 87 and 165 rad/s show the same; the field alone was believed, with 8 rad/s."""
+    told, _ = beyond_the_gyroscope(12.5)
+    assert unfolding(told) == (0, False)
+    assert np.isnan(fusion(told).rate).all()
+    with pytest.raises(InputError, match=r"by the limit of the gyroscope it spins faster than 12\.5 readings"):
+        estimate(told, "best")

@@ -45,6 +45,8 @@ ONE_WAY = 0.9
 AS_WRITTEN = "as the gyroscope's"
 #: Ways to lay the axes are told apart where one leaves this much less than the other, in the ratio's own size.
 APART = 0.8
+#: Share of the readings in a spin that stand at one limit, above which a gyroscope tells no rate but that it is faster.
+CLIPPED = 0.5
 
 
 @dataclass(frozen=True)
@@ -216,6 +218,8 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     reading the way is not seen; a gyroscope that clips may show half of the spin.
     """
     rate = while_spinning(gyro, gyro).value[:, spin]
+    if rate.size == 0 or np.mean(np.abs(rate) > 0.999 * np.nanmax(np.abs(rate))) > CLIPPED:
+        return 0  # it spins faster than it says, and between two readings of the field perhaps by more than half a turn
     seen = while_spinning(field, gyro)
     value = seen.value[:, [(spin + 1) % 3, (spin + 2) % 3]]
     fresh = np.asarray(np.all(np.isfinite(value), axis=1))
