@@ -47,6 +47,8 @@ AS_WRITTEN = "as the gyroscope's"
 APART = 0.8
 #: Share of the readings in a spin that stand at one limit, above which a gyroscope tells no rate but that it is faster.
 CLIPPED = 0.5
+#: No disc is thrown with more spin, rad/s (docs/checking.md).
+FASTEST = 200.0
 
 
 @dataclass(frozen=True)
@@ -218,8 +220,6 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     reading the way is not seen; a gyroscope that clips may show half of the spin.
     """
     rate = while_spinning(gyro, gyro).value[:, spin]
-    if rate.size == 0 or np.mean(np.abs(rate) > 0.999 * np.nanmax(np.abs(rate))) > CLIPPED:
-        return 0  # it spins faster than it says, and between two readings of the field perhaps by more than half a turn
     seen = while_spinning(field, gyro)
     value = seen.value[:, [(spin + 1) % 3, (spin + 2) % 3]]
     fresh = np.asarray(np.all(np.isfinite(value), axis=1))
@@ -229,7 +229,10 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     x, y = (value[fresh] - value[fresh].mean(axis=0)).T
     angle = np.angle((x[1:] + 1j * y[1:]) * (x[:-1] - 1j * y[:-1]))
     step, least = float(np.median(np.diff(seen.t[fresh]))), float(np.nanmedian(rate))
-    clear = np.mean(np.sign(angle) == np.sign(np.median(angle))) > ONE_WAY and abs(least) * step < np.pi / 2
+    # at a limit it spins faster than it says, and perhaps by more than half a turn between two readings of the field
+    limited = np.mean(np.abs(rate) > 0.999 * np.nanmax(np.abs(rate))) > CLIPPED
+    seldom = FASTEST * step > np.pi if limited else abs(least) * step > np.pi / 2
+    clear = np.mean(np.sign(angle) == np.sign(np.median(angle))) > ONE_WAY and not seldom
     return -int(np.sign(np.median(angle)) * np.sign(least)) if clear else 0
 
 
