@@ -25,6 +25,7 @@ from discsim.estimators.usable import remembered
 from discsim.recording import Recording, Samples, SensorSheet
 
 __all__ = [
+    "FASTEST_THROW",
     "Agreement",
     "FusionSettings",
     "accelerometer_calibrated",
@@ -384,15 +385,17 @@ def _by_pull(recording: Recording, rates: Mapping[int, float], settings: FusionS
     return [{k for k, rate in rates.items() if low <= abs(rate) <= high}] if force > 0 else []
 
 
-#: No disc is thrown with more spin, rad/s (docs/checking.md). A free spin slows down, but
-#: with a time constant above two seconds, and what grows by less than this share in a second may be steady.
-FASTEST, STEEPEST, STEADY = 200.0, 0.5, 0.02
+#: No disc is thrown with more spin, rad/s (docs/checking.md).
+FASTEST_THROW = 200.0
+#: A free spin slows down, but with a time constant above two seconds, and what grows by less than this share in a
+#: second may be steady.
+STEEPEST, STEADY = 0.5, 0.02
 
 
 def _slowing(track: Track, rates: Mapping[int, float]) -> set[int]:
     """Return which of some rates at the middle of a track (rad/s, by their k) are those of a free spin that slows."""
     slope = float(np.polyfit(track.t, track.rate, 1)[0]) if len(track.t) > 2 else 0.0
-    change = {k: slope / rate for k, rate in rates.items() if 0.0 < abs(rate) < FASTEST}
+    change = {k: slope / rate for k, rate in rates.items() if 0.0 < abs(rate) < FASTEST_THROW}
     return {k for k, share in change.items() if -STEEPEST < share < STEADY}
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.estimators.fusion import FASTEST_THROW
 from discsim.validation.importing.import_map import G0
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
 from discsim.validation.importing.sniffing.spin_axis import (
@@ -47,8 +48,6 @@ AS_WRITTEN = "as the gyroscope's"
 APART = 0.8
 #: Share of the readings in a spin that stand at one limit, above which a gyroscope tells no rate but that it is faster.
 CLIPPED = 0.5
-#: No disc is thrown with more spin, rad/s (docs/checking.md).
-FASTEST = 200.0
 
 
 @dataclass(frozen=True)
@@ -231,7 +230,7 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     step, least = float(np.median(np.diff(seen.t[fresh]))), float(np.nanmedian(rate))
     # at a limit it spins faster than it says, and perhaps by more than half a turn between two readings of the field
     limited = np.mean(np.abs(rate) > 0.999 * np.nanmax(np.abs(rate))) > CLIPPED
-    seldom = FASTEST * step > np.pi if limited else abs(least) * step > np.pi / 2
+    seldom = FASTEST_THROW * step > np.pi if limited else abs(least) * step > np.pi / 2
     clear = np.mean(np.sign(angle) == np.sign(np.median(angle))) > ONE_WAY and not seldom
     return -int(np.sign(np.median(angle)) * np.sign(least)) if clear else 0
 
