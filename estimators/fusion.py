@@ -351,16 +351,11 @@ def unfolding(recording: Recording, settings: FusionSettings | None = None) -> t
 
 def _by_gyroscope(recording: Recording, rates: Mapping[int, float], fold: float, track: Track) -> list[set[int]]:
     """Return which of some rates (rad/s, by their k) a gyroscope's z allows, and where it is clipped a free spin."""
-    gyroscope = recording.get("gyroscope")
-    if gyroscope is None:
-        return []
-    z = gyroscope.value[:, 2]
-    clipped = recording.sheets["gyroscope"].clipped(gyroscope.value)[np.isfinite(z), 2]
-    z = z[np.isfinite(z)]
+    z, _ = _spin_readings(recording)
     if not z.size:
         return []
     level = float(np.median(z))
-    if np.mean(clipped) < 0.5:
+    if not mostly_clipped(recording):
         return [{k for k, rate in rates.items() if abs(rate - level) < 0.1 * fold}]
     votes = [{k for k, rate in rates.items() if rate * np.sign(level) > 0.9 * abs(level)}]
     return [*votes, _slowing(track, rates)] if recording.plant in ("flight", "free_spin") else votes
@@ -400,11 +395,18 @@ def _slowing(track: Track, rates: Mapping[int, float]) -> set[int]:
 
 
 def mostly_clipped(recording: Recording) -> bool:
-    """Tell a gyroscope whose z stands at its limit in more than half of its readings: it bounds the spin alone."""
+    """Tell a gyroscope whose z stands at its limit in half of its readings or more: it bounds the spin alone."""
+    z, clipped = _spin_readings(recording)
+    return z.size > 0 and bool(np.mean(clipped) >= 0.5)
+
+
+def _spin_readings(recording: Recording) -> tuple[FloatArray, BoolArray]:
+    """Return what a gyroscope reads of z (n,), rad/s, gaps left out, and which readings are at its limit."""
     gyroscope = recording.get("gyroscope")
     if gyroscope is None:
-        return False
-    return bool(np.mean(recording.sheets["gyroscope"].clipped(gyroscope.value)[:, 2]) > 0.5)
+        return np.zeros(0), np.zeros(0, dtype=np.bool_)
+    z, clipped = gyroscope.value[:, 2], recording.sheets["gyroscope"].clipped(gyroscope.value)[:, 2]
+    return z[np.isfinite(z)], clipped[np.isfinite(z)]
 
 
 def _may_fold(recording: Recording, fold: float) -> bool:

@@ -224,7 +224,9 @@ def _folded(recording: Recording, name: str) -> str:
 
     What a gyroscope in range says is told beside the rates (`folding_notes`).
     """
-    if name not in BY_THE_FIELD or not mostly_clipped(recording) or unfolding(recording) == (0, True):
+    if name not in BY_THE_FIELD or "magnetometer" not in recording:
+        return ""
+    if not mostly_clipped(recording) or unfolding(recording) == (0, True):
         return ""
     rate = 1.0 / recording.need("magnetometer").interval
     return (
@@ -295,13 +297,13 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
         if absent := missing_sensors(recording, name):
             reasons[name] = f"no {', '.join(absent)}"
             continue
+        if told := _folded(sound.recording, name):
+            reasons[name] = told
+            continue
         try:
             candidate = _estimate(sound, name, options)
         except InputError as error:
             reasons[name] = str(error)
-            continue
-        if told := _folded(sound.recording, name):
-            reasons[name] = told
             continue
         share = float(np.mean(np.isfinite(candidate.rate))) if len(candidate) else 0.0
         if share >= ENOUGH:

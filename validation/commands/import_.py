@@ -13,6 +13,7 @@ from discsim.validation.reporting.options import DateOption, OutOption, PlaceOpt
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from discsim.environment import Environment
     from discsim.validation.importing import ImportMap
     from discsim.validation.importing.imported_log import LogPart
     from discsim.validation.importing.sniffing import Proposal
@@ -73,10 +74,10 @@ def command(
 
     part = LogPart(None if rows is None else parse_rows(rows), throw, all_throws)
     part.check()
-    at_place(Environment(), place, date)  # what is wrong with them is said before a long log is read
+    there = at_place(Environment(), place, date)  # what is wrong with them is said before a long log is read
     named = None if map_ in ("auto", "sniff") else read_map(find_map(map_))
     _leave_alone(raw, out)
-    asked = _Asked(raw, map_, named, part, plant, write_map, place, date)
+    asked = _Asked(raw, map_, named, part, plant, write_map, place, date, there)
     said: list[str] = []
     with opened(raw, said.append) as logged:
         logs = several_logs(logged)
@@ -90,7 +91,10 @@ def command(
 
 
 class _Asked(NamedTuple):
-    """What was asked of an import, for each log of a folder; ``named`` is the map of that name."""
+    """What was asked of an import, for each log of a folder.
+
+    ``named`` is the map of that name; ``there`` an environment at ``place`` of which nothing else is known.
+    """
 
     raw: Path
     map_: str
@@ -100,6 +104,7 @@ class _Asked(NamedTuple):
     write_map: Path | None
     place: str | None
     date: str | None
+    there: Environment
 
 
 def _each(asked: _Asked, logs: Sequence[Path], out: Path) -> list[Path]:
@@ -125,7 +130,6 @@ def _each(asked: _Asked, logs: Sequence[Path], out: Path) -> list[Path]:
 
 def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) -> None:
     """Import one log that is `opened` into ``out``; ``said`` are notes on how it was read."""
-    from discsim.environment import Environment
     from discsim.validation.importing.imported_log import take
     from discsim.validation.importing.resting import dip_at_rest
     from discsim.validation.importing.sniffing import recognised, sniff
@@ -137,7 +141,7 @@ def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) 
     known = recognised(logged) if asked.map_ == "auto" else asked.named
     proposal = sniff(logged, asked.plant) if known is None else None
     if proposal is not None and place is not None:
-        proposal = proposal.in_field(at_place(Environment(), place, date).field_strength)
+        proposal = proposal.in_field(asked.there.field_strength)
     if known is not None and asked.named is None:
         said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
     with start_run(out, None, [asked.raw, *([known.path] if known else [])]) as run:
