@@ -7,45 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray, IntArray
+from discsim.arrays import IntArray
 from discsim.glitches import FASTEST_SPIN, glitches
 from discsim.validation.importing.held import Held, find_held, find_interpolated, fresh_rows, step_of
+from discsim.validation.importing.own_times import between_rows, in_step, own_times
+from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.timing import row_timing
 
-__all__ = ["Cleaned", "Readings", "body_moves", "cleaned", "frozen_runs", "without_glitches"]
+__all__ = ["Cleaned", "body_moves", "cleaned", "frozen_runs", "without_glitches"]
 
 #: a sensor that shows one value on this many rows, while the body moves, is dead
 CONSTANT = 50
 #: fewest rows, and times the usual standing of a reading, for which a sensor that moved before stands when it froze
 FROZEN_ROWS, FROZEN_TIMES = 20, 10.0
-#: share of a reading's lateness that moves the phase of its sensor, times the share of rows that repeat
-PHASE_GAIN = 0.1
-#: share of readings that one clock must explain; the first row of a reading is lost as often as any row
-ONE_CLOCK = 0.97
-#: readings over which the clock of a held sensor is taken as even where one clock does not do for all
-NEARBY = 21
-#: rows over which a sensor that never leaves the logger's count of rows is read by its loop: oscillators of parts agree
-#: within 1 to 3 %, and so part by a row in a hundred rows; three times as many for two that happen to agree better
-IN_STEP = 300
 #: what moves: a rate (rad/s) above any gyroscope's bias; a span of the field (uT) of a quarter turn of the weakest on
 #: Earth; a span of the specific force (m/s^2) of half a g
 MOVES = {"gyroscope": 0.5, "magnetometer": 20.0, "accelerometer": 5.0}
-
-
-class Readings(NamedTuple):
-    """A sensor's sound rows: number (n,), time (n,) s on the file's clock, value (n, k) in recording units and axes."""
-
-    number: IntArray
-    time: FloatArray
-    value: FloatArray
-
-    def select(self, chosen: BoolArray) -> Readings:
-        """Return the chosen (n,) rows."""
-        return Readings(self.number[chosen], self.time[chosen], self.value[chosen])
 
 
 @dataclass(frozen=True)
@@ -106,7 +86,16 @@ def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stampe
     found, said = _thawed(sensor, found, others, standing)
     notes += said
     if held is None:
-        return Cleaned(found, rate, tuple(notes))
+        here = found.select(~np.all(np.isnan(found.value), axis=1))
+        own = between_rows(here, others) if sensor == "magnetometer" else None
+        if own is None:
+            return Cleaned(found, rate, tuple(notes))
+        notes.append(
+            f"{sensor}: its readings come every {own.period / own.row:.2f} rows, at {1 / own.period:.4g} Hz in a log "
+            f"of {1 / own.row:.4g} Hz: they bear {_evenly(own.one_clock)}, at most a row before the row on which they "
+            "stand"
+        )
+        return Cleaned(Readings(here.number, own.time, here.value), 1 / own.period, tuple(notes))
     readings, period, said_of_it = _held(sensor, found, held, total, stamped)
     return Cleaned(readings, 1 / period, (*notes, said_of_it))
 
@@ -124,14 +113,13 @@ def _held(sensor: str, found: Readings, held: Held, total: int, stamped: bool) -
     if before < total:
         apart = np.diff(fresh.time) / row
         stands = float(np.mean(apart[apart < 2 * np.median(apart)]))
-    if (every := _in_step(fresh.time / row, written, stands)) is not None:
+    if (every := in_step(fresh.time / row, written, stands)) is not None:
         period, time = every * row, fresh.time.copy()
         time[0] = min(time[0], time[1] - period)  # it may stand since before the first row
         bear = f"it is read every {_ordinal(every)} row, in step with the log, and has the time of that row"
     else:
-        period, time, one_clock = _own_times(fresh.time, written.astype(float), stands, row)
-        even = "the even times of its own clock" if one_clock else "times as even as the rows allow"
-        bear = f"what is left bears {even}, at most a row before the row at which it first shows"
+        period, time, one_clock = own_times(fresh.time, written.astype(float), stands, row)
+        bear = f"what is left bears {_evenly(one_clock)}, at most a row before the row at which it first shows"
     per_row = "" if stamped else f" (rows taken as {1 / row:.4g} Hz)"
     said = (
         f"{sensor}: its readings stand on {stands:.2f} rows each (sample and hold): it runs at "
@@ -139,6 +127,10 @@ def _held(sensor: str, found: Readings, held: Held, total: int, stamped: bool) -
         f"repeat and are left out; {bear}"
     )
     return Readings(fresh.number, time, fresh.value), period, said
+
+
+def _evenly(one_clock: bool) -> str:
+    return "the even times of its own clock" if one_clock else "times as even as the rows allow"
 
 
 def _ordinal(number: int) -> str:
@@ -232,85 +224,3 @@ def _thawed(
     for first, after in runs:
         kept[first + 1 : after] = False
     return found.select(kept), notes
-
-
-def _in_step(first_shown: FloatArray, written: IntArray, rows_per_reading: float) -> int | None:
-    """Return every how many rows a held sensor is read by the logger's own loop; None for one on a clock of its own.
-
-    ``first_shown`` (n,) are the times of the rows at which its readings first show, in rows, ``written`` (n - 1,) the
-    rows between. Two oscillators part by a row within `IN_STEP` rows; those of one loop never do. The first reading may
-    stand since before the first row.
-    """
-    every = round(rows_per_reading)
-    if every < 2:
-        return None
-    rows = np.round(np.diff(first_shown))[1:]
-    in_step = (rows % every == 0) | (written[1:] % every == 0)
-    return every if rows.sum() >= IN_STEP and np.all(in_step) else None
-
-
-def _own_times(
-    first_shown: FloatArray, written: FloatArray, rows_per_reading: float, row: float
-) -> tuple[float, FloatArray, bool]:
-    """Return a held sensor's period (s), the times (n,) of its readings, and whether one even clock explains them all.
-
-    ``first_shown`` (n,) s are the times of the rows at which they first show, ``written`` (n - 1,) the rows between.
-    A reading was taken within one row before the row at which it first shows. Where one clock lies within these rows, a
-    line through the counted readings, half a row earlier, is that clock. Else (the two clocks run apart, readings came
-    in bursts) the line is followed over `NEARBY` readings and the times kept within the row before each first row.
-    """
-    count = _counted(first_shown / row, written, rows_per_reading)
-    if first_shown.size < 8:
-        return rows_per_reading * row, first_shown - row / 2, False
-    near = np.ones(count.size, dtype=np.bool_)
-    for _ in range(4):
-        slope, start = np.polyfit(count[near], first_shown[near] - first_shown[0], 1)
-        late = first_shown - first_shown[0] - (start + slope * count)
-        # lateness is even from 0 to one row; a tenth of a row is left for the stamps' own rounding
-        near = np.abs(late - np.median(late)) <= 0.55 * row
-    # where a row was lost, a reading shows a row or more later
-    if np.mean(near) >= ONE_CLOCK:
-        return float(slope), np.asarray(first_shown - late - row / 2), True
-    width = min(NEARBY, first_shown.size // 2 * 2 - 1)
-    padded = np.pad(late, width // 2, mode="reflect", reflect_type="odd")
-    smooth = np.convolve(padded, np.ones(width) / width, mode="valid")
-    time = first_shown - late + smooth - row / 2
-    time = np.clip(time, first_shown - 0.99 * row, first_shown)
-    return float(np.median(np.diff(time))), time, False
-
-
-def _counted(first_shown: FloatArray, written: FloatArray, rows_per_reading: float) -> FloatArray:
-    """Return the number (n,) of each reading in its sensor's own count, from the row times of first showing, in rows.
-
-    A reading stands on at most one row more than its period, so the rows between two readings tell the least number of
-    readings in them, and where no row was lost this is the number. Else the sensor's phase decides: its period comes
-    from the longest stretch without a lost row, its phase is followed with a loop that is slow against the beat of the
-    two clocks, over which lateness runs through its row.
-    """
-    rows = np.diff(first_shown)
-    lost = np.maximum(np.round(rows - written), 0.0)
-    before = np.concatenate([[0.0], lost[:-1]])
-    least = np.maximum(1.0, np.ceil((rows - 1 - lost) / rows_per_reading - 0.05))
-    doubtful = lost + before > 0
-    most = np.where(doubtful, np.maximum(least, np.floor((rows + 1 + before) / rows_per_reading + 0.05)), least)
-    if not np.any(doubtful):
-        return np.concatenate([[0.0], np.cumsum(least)])
-    edges = np.concatenate([[0], np.flatnonzero(doubtful) + 1, [first_shown.size]])
-    longest = int(np.argmax(np.diff(edges)))
-    period = rows_per_reading
-    first = np.concatenate([[0.0], np.cumsum(least)])
-    if edges[longest + 1] - edges[longest] > NEARBY:
-        whole = slice(edges[longest], edges[longest + 1])
-        period = float(np.polyfit(first[whole], first_shown[whole], 1)[0])
-    gain = PHASE_GAIN * (1 - 1 / period)
-    numbers = np.zeros(first_shown.size)
-    phase = float(np.mean(first_shown[: edges[1]] - period * first[: edges[1]]))
-    for k in range(rows.size):
-        # a reading that came while rows were lost shows late by half of them, on average
-        expected = first_shown[k + 1] - lost[k] / 2
-        near = float(np.round((expected - phase) / period))
-        step = float(min(max(near, least[k]), most[k]))
-        numbers[k + 1] = numbers[k] + step
-        phase += step * period
-        phase += gain * (expected - phase)
-    return numbers

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from discsim.arrays import BoolArray, FloatArray, runs
-from discsim.validation.importing.cleaning import FROZEN_ROWS, FROZEN_TIMES, Readings
+from discsim.validation.importing.cleaning import FROZEN_ROWS, FROZEN_TIMES
 from discsim.validation.importing.held import step_of
+from discsim.validation.importing.readings import Readings
 
 __all__ = ["dead_axis", "failed_at_once", "failed_on_one_axis", "failed_rows", "on_all_axes"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from discsim.validation.importing.cleaning import Readings
 from discsim.validation.importing.import_map import ImportMap
 from discsim.validation.importing.raw_table import RawTable, RepairList
+from discsim.validation.importing.readings import Readings
 
 __all__ = ["fixes_once"]
 

@@ -40,7 +40,7 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 
-__all__ = ["Held", "evidence", "find_held", "find_interpolated", "fresh_rows", "step_of"]
+__all__ = ["Held", "come_evenly", "evidence", "find_held", "find_interpolated", "fresh_rows", "step_of"]
 
 #: log likelihood ratio that each kind of evidence must exceed; e^-10 is 5e-5, and both must err at once
 EVIDENCE = 10.0
@@ -127,6 +127,17 @@ def evidence(same: BoolArray, size: int) -> tuple[float, float, int, float]:
         rows += len(block)
         fresh += len(block) * (1 - _held_share(block, together))
     return joint, even, rows, fresh
+
+
+def come_evenly(rows: BoolArray) -> bool:
+    """Tell whether some rows (n,) of a log come as evenly as those without a reading of a slower sensor."""
+    for size in BLOCKS:
+        spaced = [_even(rows[start : start + size]) for start in range(0, len(rows), size)]
+        if sum(found for found in spaced if found is not None) > ALONE:
+            return True
+        if size > len(rows):
+            break
+    return False
 
 
 def _held_share(block: BoolArray, together: BoolArray) -> float:

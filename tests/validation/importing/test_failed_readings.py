@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, LANDING, RATE, RELEASE, made_log, three, write_table
 
-from discsim.validation.importing.cleaning import Readings, cleaned
+from discsim.validation.importing.cleaning import cleaned
 from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, failed_rows
 from discsim.validation.importing.imported_log import import_log
+from discsim.validation.importing.readings import Readings
 
 LOG = made_log()
 ROWS = np.arange(LOG.t.size)

@@ -12,10 +12,10 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
 from discsim.validation.importing.apart import apart, zones
-from discsim.validation.importing.cleaning import Readings
 from discsim.validation.importing.clock import DATED, DAY, EPOCH
 from discsim.validation.importing.import_map import SPEEDS, UNITS
 from discsim.validation.importing.raw_table import Layout
+from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Numbers
