@@ -30,7 +30,12 @@ def test_a_notebook_is_kept_with_the_outputs_of_each_cell_and_without_an_error(p
 
 
 @pytest.mark.filterwarnings("default")  # of the kernel's own packages
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+# what the notebook of a diagnosis runs, docs/tutorial.md runs as well
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, marks=pytest.mark.slow) if path.stem == "diagnose-a-log" else path for path in NOTEBOOKS],
+    ids=lambda path: path.stem,
+)
 def test_a_notebook_runs_and_says_what_it_said(path, tmp_path, monkeypatch):
     monkeypatch.setitem(os.environ, "PYTHONPATH", str(ROOT))
     kept = nbformat.read(path, as_version=4)

@@ -163,7 +163,14 @@ def test_without_a_field_diagnose_says_what_to_add(name, answers, tmp_path):
 
 
 # of the two inertial units of a cats log, which lie in the same files, one stands for both
-@pytest.mark.parametrize("name", [name for name in ROTATING if name != "cats_imu1"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in ("flatball", "phyphox") else pytest.param(name, marks=pytest.mark.slow)
+        for name in ROTATING
+        if name != "cats_imu1"
+    ],
+)
 def test_diagnose_answers(name, tmp_path):
     """Within seconds, of which a lag or an offset may leave a sensor no reading at all."""
     place, day = LOGGERS[name].place or (None, None)

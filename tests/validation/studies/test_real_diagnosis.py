@@ -206,6 +206,7 @@ def test_a_throw_flown_in_its_own_world_comes_down_at_its_tracks_end():
     assert found.on_the_way < 1e-3
 
 
+@pytest.mark.slow
 def test_a_camera_is_found_by_two_throws_and_tried_on_the_third():
     """Among the causes it alone leaves little of the throw left out, and its size is what was put in."""
     parallax = (1.0 / 60.0, 0.5, -0.2)

@@ -150,6 +150,7 @@ def test_a_time_base_that_is_a_fifth_wrong_is_found_as_the_clock():
     assert answer.agreement.contradiction
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not FLATBALL.is_dir(), reason="the recordings are not there")
 def test_the_throws_of_an_ultimate_disc_agree_once_their_rows_are_counted():
     recordings = []

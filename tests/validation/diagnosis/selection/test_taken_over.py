@@ -55,6 +55,7 @@ def test_what_was_found_is_taken_over_without_asking_for_it_again():
     assert bias["gyro.bias", "bx_rad_s"] == pytest.approx(0.05, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_baseline_that_is_hopeless_beside_what_was_found_is_that_of_the_search_before():
     again = screened(SearchProblem(spins(BIAS), followed=in_halves(spins(BIAS))), before=found())
     assert again.base is found().base

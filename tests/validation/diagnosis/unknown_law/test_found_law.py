@@ -327,7 +327,10 @@ def test_a_disc_that_dries_as_it_flies_is_a_share_of_what_the_air_does():
     assert found.law.coefficients["tau"].value == pytest.approx(0.6, rel=0.1)
 
 
-@pytest.mark.parametrize("secret", [Thermal(1.0, 14.0, 6.0, 20.0), Thermal(3.0, 10.0, 40.0, 20.0)])
+@pytest.mark.parametrize(
+    "secret",
+    [Thermal(1.0, 14.0, 6.0, 20.0), pytest.param(Thermal(3.0, 10.0, 40.0, 20.0), marks=pytest.mark.slow)],
+)
 def test_air_that_rises_about_a_place_is_a_law_of_that_place(secret: Thermal):
     """Jumps between segments take up most of what a wind does: the second would be sought across the paths from it."""
     with np.errstate(all="ignore"):  # as a diagnosis runs: a start that is far off may take a motion beyond all numbers
