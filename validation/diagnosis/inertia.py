@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import ComplexArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.recording import Recording
@@ -30,6 +30,9 @@ _AIR = 5.0
 _TRIED = np.concatenate([np.arange(0.05, 0.9501, 0.005), np.arange(1.05, 2.0501, 0.005)])
 #: a wobble is read where it explains this share of the transverse rates
 _READ = 0.5
+#: and where the ratio is the same within this, with drifts beside it and without: a course of the wobble hides half a
+#: radian of what it turns by, which is ten or more in a second
+_ALIKE = 0.05
 #: and a body tumbles, for which no ratio stands in, where they are this share of the spin
 _TUMBLES = 0.3
 #: stands in for the moment of inertia, kg m^2, mass, kg, and size, m, none of which a free spin shows
@@ -93,13 +96,23 @@ def _wobble(recording: Recording) -> tuple[float, float, float, float] | None:
     psi = angle_turned(recording, t)
     x = (t - t.mean()) / max(0.5 * (t[-1] - t[0]), 1e-9)
     course = np.vander(x, 3).astype(complex)
+    turning = np.exp(-1j * psi)
     # what stands still in the body, and what stands still beside it
-    still = np.column_stack([np.ones_like(y), np.exp(-1j * psi)])
+    ratio, share = _best(np.column_stack([np.ones_like(y), turning]), course, psi, y)
+    # what drifts there turns as a wobble of a ratio near 1 or 0 does, which is none beside such drifts
+    beside, _ = _best(np.column_stack([course, course * turning[:, None]]), course, psi, y)
+    return ratio, _AIR / max(spin, 1e-9), share if abs(ratio - beside) < _ALIKE else 0.0, size
+
+
+def _best(still: ComplexArray, course: ComplexArray, psi: FloatArray, y: ComplexArray) -> tuple[float, float]:
+    """Return the ratio at which a wobble of a slow ``course`` (n, k) explains most of y (n,), and the share of it.
+
+    ``still`` (n, m) is what else may be there, and ``psi`` (n,) the angle turned, rad.
+    """
     before = _left(still, y)
     after = [_left(np.column_stack([still, course * np.exp(1j * (one - 1.0) * psi)[:, None]]), y) for one in _TRIED]
     best = int(np.argmin(after))
-    share = 1.0 - after[best] / before if before > 0.0 else 0.0
-    return float(_TRIED[best]), _AIR / max(spin, 1e-9), share, size
+    return float(_TRIED[best]), 1.0 - after[best] / before if before > 0.0 else 0.0
 
 
 #: fewest readings per number that is fitted to them

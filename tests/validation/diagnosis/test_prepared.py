@@ -153,6 +153,19 @@ def test_without_any_disc_the_ratio_has_the_prior_of_a_bare_disc(wobble):
     assert "prior 1.93" in said[0]
 
 
+def test_a_wobble_that_dies_beside_a_moment_that_grows_is_that_of_a_disc():
+    """What the air turns a disc by is no wobble of a ratio near 0, at which a free spin without [disc] then began."""
+
+    def dying(t, value):
+        rates = np.exp(1j * 0.93 * 30.0 * t) * np.exp(-6.0 * t) + 0.4 * (t / 1.25 - 1.0) * np.exp(-30j * t)
+        return t, np.column_stack([rates.real, rates.imag, value[:, 2]])
+
+    spins = [changed(spinning(end=2.5, spin=30.0, seed=seed), "gyroscope", dying) for seed in range(2)]
+    given, said = with_inertia(spins)
+    assert given[0].disc.Izz / given[0].disc.Ixx == pytest.approx(BARE)
+    assert "prior 1.93" in said[0]
+
+
 @pytest.mark.parametrize("ratio", [0.12, 0.5, 1.3])
 def test_the_wobble_of_a_body_that_is_no_disc_tells_its_ratio(ratio):
     """A free symmetric body turns its transverse rates by (Izz/Ixx - 1) r.
