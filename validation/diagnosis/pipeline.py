@@ -25,6 +25,7 @@ from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
 from discsim.validation.diagnosis.result import Outcome
+from discsim.validation.diagnosis.selection.candidates import stand_ins
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.refitted_out_of_balance import refitted_out_of_balance
@@ -192,16 +193,18 @@ def _with_bends(found: Search, followed: Fit, problem: SearchProblem) -> Search:
 
     ``followed`` is the relaxed fit that it began with. A search in halved segments begins with the effects of the one
     before, where these leave no more than noise. Bends may stand in for what a search named, or hide one thing more: a
-    stack of effects beside them copies what nobody knows.
+    stack of effects beside them copies what nobody knows. Effects that stand for what is not stated are no such stack.
     """
+    unstated = {candidate.id for candidate in stand_ins(found.recordings)}
     for _ in range(_BENDS):
-        left, count = leaves_more_than_noise(found), len(found.final.hypothesis.candidates)
-        bent = with_bends_followed(found, followed) if left or count else None
+        left, named = leaves_more_than_noise(found), [one.id for one in found.final.hypothesis.candidates]
+        bent = with_bends_followed(found, followed) if left or named else None
         if bent is None:
             break
-        most = 1 if left else count
-        again = search(replace(problem, followed=bent), Anew(most, None if left else found))
-        if len(again.final.hypothesis.candidates) > most or (leaves_more_than_noise(again) and not left):
+        most = 1 if left else len([id for id in named if id not in unstated])
+        again = search(replace(problem, followed=bent), Anew(most + len(unstated), None if left else found))
+        errors = [one for one in again.final.hypothesis.candidates if one.id not in unstated]
+        if len(errors) > most or (leaves_more_than_noise(again) and not left):
             break
         followed, found = bent, again
     return found

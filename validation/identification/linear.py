@@ -99,7 +99,7 @@ class Linear:
         They are worked out each time: kept for every recording they would be most of what a fit holds in memory.
         """
         d, width = self.sensitivities.shape[1:]
-        full = np.empty((self.raw.size, width))
+        full = np.zeros((self.raw.size, width))  # also those that hang on several segments: chance numbers may add to NaN
         for i in range(self.sensitivities.shape[0]):
             rows = np.flatnonzero(self.segment == i)
             full[rows] = self.own[rows, :d] @ self.sensitivities[i]

@@ -13,6 +13,7 @@ from discsim.errors import InputError
 from discsim.limits import LARGEST_READING
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
+from discsim.validation.importing.held import come_evenly
 from discsim.validation.importing.import_map import ImportMap, SensorMap
 from discsim.validation.importing.logs.tables import positions
 from discsim.validation.importing.raw_table import RawTable, RepairList
@@ -24,6 +25,9 @@ __all__ = ["chosen_rows", "hollow_rows", "sensor_rows"]
 
 #: A name that says feet: altitude (ft), alt_ft, GPS Alt [feet].
 _FEET = re.compile(r"(?<![a-z])(?:ft|feet|foot)(?![a-z])", re.IGNORECASE)
+
+#: Least share of rows that are empty where every second one is: some readings at the start may stand on all.
+NEARLY_HALF = 0.45
 
 
 def chosen_rows(table: RawTable, sensor_map: SensorMap, hollow: BoolArray) -> int:
@@ -38,7 +42,8 @@ def chosen_rows(table: RawTable, sensor_map: SensorMap, hollow: BoolArray) -> in
 def hollow_rows(table: RawTable, names: Sequence[str], sensor_map: SensorMap, decimal: str) -> BoolArray:
     """Tell the rows (n,) of a faster log in which all cells of a slower sensor are empty.
 
-    A sensor is slower where that is so in most of its rows; gaps of one that is as fast as the log are no such rows.
+    A sensor is slower where that is so in most of its rows, or in every second one; gaps of one that is as fast as the
+    log are no such rows.
     """
     here = np.ones(len(table), dtype=np.bool_)
     if sensor_map.where is not None:
@@ -47,9 +52,10 @@ def hollow_rows(table: RawTable, names: Sequence[str], sensor_map: SensorMap, de
     for name in names:
         value, wrong = table.column(name).numbers(decimal)
         hollow &= np.isnan(value) & ~wrong
-        if np.count_nonzero(hollow) <= all_of_it / 2:
+        if np.count_nonzero(hollow) < NEARLY_HALF * all_of_it:
             return np.zeros_like(here)
-    return hollow if np.count_nonzero(hollow) < all_of_it else np.zeros_like(here)
+    slower = np.count_nonzero(hollow) > all_of_it / 2 or come_evenly(hollow[here])
+    return hollow if slower and np.count_nonzero(hollow) < all_of_it else np.zeros_like(here)
 
 
 def sensor_rows(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from support.made_logs import made_log
+from support.made_logs import RATE, made_log
 
 from discsim.validation.importing.imported_log import import_log
 
@@ -158,6 +158,16 @@ def test_a_magnetometer_with_empty_cells_between_has_its_own_rate(tmp_path):
     assert recording.sheets["magnetometer"].rate_hz == pytest.approx(50.0)
     assert recording.samples["magnetometer"].gaps == 0
     assert not done.imported[0].repairs
+
+
+def test_a_sensor_on_every_second_row_is_one_of_half_the_rate(tmp_path):
+    rows = [[f"{cell:.6g}" for cell in base] for base in BASE]
+    lines = [",".join(row if k % 2 or k < 40 else [*row[:7], "", "", ""]) for k, row in enumerate(rows)]
+    (tmp_path / "log.csv").write_text("\n".join([HEAD, *lines, ""]))
+    recording = import_log(tmp_path / "log.csv").recordings[0]
+    mag = recording.samples["magnetometer"]
+    assert mag.gaps == 0
+    assert recording.sheets["magnetometer"].rate_hz == pytest.approx(0.5 * RATE)
 
 
 def test_gaps_of_a_sensor_that_is_as_fast_as_the_log_stay_gaps(tmp_path):

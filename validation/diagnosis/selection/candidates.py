@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 from discsim.effects.catalogue import CATALOGUE, Row
 from discsim.effects.mount_rows import Mount
 from discsim.effects.own import UserEffect
+from discsim.effects.sensors import PositionOffset
 from discsim.recording import Recording
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import PLANTS
 from discsim.validation.identification.propagation import Column
 
-__all__ = ["CandidateEffect", "candidates_for", "free_candidate", "in_parameters", "parameters_of"]
+__all__ = ["CandidateEffect", "candidates_for", "free_candidate", "in_parameters", "parameters_of", "stand_ins"]
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,15 @@ def candidates_for(recordings: Sequence[Recording], effects: Competing = CATALOG
         plant = recordings[0].plant
         candidates += [free_candidate(row.id, shape, effects.user_effect(row.id), plant) for shape in shape_grid]
     return tuple(candidates)
+
+
+def stand_ins(recordings: Sequence[Recording], effects: Competing = CATALOGUED) -> tuple[CandidateEffect, ...]:
+    """Return the candidates that stand for what nobody stated, and are no errors: where the accelerometer sits."""
+    sheets = [one.sheets["accelerometer"] for one in recordings if "accelerometer" in one.samples]
+    if all(sheet.position is not None for sheet in sheets):
+        return ()
+    rows = [row for row in available(recordings, effects) if row.type is PositionOffset]
+    return tuple(free_candidate(row.id, plant=recordings[0].plant) for row in rows)
 
 
 def free_candidate(

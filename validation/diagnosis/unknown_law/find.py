@@ -17,6 +17,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.kind import BOARD
 from discsim.recording import Recording
 from discsim.validation.diagnosis.result import Law
+from discsim.validation.diagnosis.selection.candidates import parameters_of, stand_ins
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search
@@ -160,7 +161,8 @@ def find_law(
     """Return the law that explains what the catalogue does not, or None where none holds on held-out recordings.
 
     ``relaxed_fit`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own``
-    the parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit. ``instead``
+    the parameters that the recordings leave open without any effect, beside which what nobody stated of them is open,
+    too, ``noise`` that of the relaxed fit. ``instead``
     asks for a law that does better than the effects of the best fit, which then would explain the recordings;
     ``moves_out`` for one of what moves in a body, by the pull that it changes.
     """
@@ -169,9 +171,11 @@ def find_law(
         return None  # a path alone leaves no motion beside the data
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
+    unstated = tuple(q for candidate in stand_ins(recordings) for q in parameters_of(candidate))
+    own = (*own, *unstated)
     base = (
         best
-        if not best.hypothesis.candidates
+        if not best.hypothesis.candidates and not unstated
         else continuous_fit(relaxed_fit, Hypothesis(), own, noise, {}, iterations=6, polish=1)
     )
     own_at = _own_at(relaxed_fit, own)

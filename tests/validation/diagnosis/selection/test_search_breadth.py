@@ -16,7 +16,7 @@ from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.selection import exchange, stepwise
 from discsim.validation.diagnosis.selection import next_effect as searching
 from discsim.validation.diagnosis.selection import search_state as finding
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate, stand_ins
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
@@ -346,3 +346,14 @@ def test_a_search_that_comes_to_more_effects_than_are_of_use_is_given_up_as_it_s
     assert whole.rivals
     assert of_use.rivals.keys() == whole.rivals.keys()
     assert given_up.rivals == {}
+
+
+def test_only_an_accelerometer_whose_place_nobody_states_may_sit_anywhere():
+    """Where it sits is then no error: it counts in no stack of effects, and no law stands for it."""
+    stated = throws(seconds=0.5)[0]
+    sheet = replace(stated.sheets["accelerometer"], position=None)
+    unstated = replace(stated, sheets={**stated.sheets, "accelerometer": sheet})
+    assert stand_ins([stated]) == ()
+    [candidate] = stand_ins([stated, unstated])
+    assert candidate.id == "accel.position_offset"
+    assert len(candidate.columns) == 3
