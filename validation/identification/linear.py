@@ -99,7 +99,8 @@ class Linear:
         They are worked out each time: kept for every recording they would be most of what a fit holds in memory.
         """
         d, width = self.sensitivities.shape[1:]
-        full = np.zeros((self.raw.size, width))  # also those that hang on several segments: chance numbers may add to NaN
+        # zero also where a reading hangs on several segments: numbers that happen to stand there may add to NaN
+        full = np.zeros((self.raw.size, width))
         for i in range(self.sensitivities.shape[0]):
             rows = np.flatnonzero(self.segment == i)
             full[rows] = self.own[rows, :d] @ self.sensitivities[i]
