@@ -363,21 +363,33 @@ def _by_gyroscope(recording: Recording, rates: Mapping[int, float], fold: float,
 
 def _by_pull(recording: Recording, rates: Mapping[int, float], settings: FusionSettings) -> list[set[int]]:
     """Return which of some rates (rad/s, by their k) the centripetal force at a known place allows."""
+    pull = _pull(recording)
+    if pull is None:
+        return []
+    force, radius, clipped = pull
+    bias = settings.accelerometer_bias + 0.05 * force
+    low = np.sqrt(max(force - 3 * bias, 0.0) / (radius + 2 * settings.mount))
+    high = np.sqrt((force + 3 * bias) / max(radius - 2 * settings.mount, 0.2 * radius))
+    high = np.inf if clipped > 0.05 else high
+    return [{k for k, rate in rates.items() if low <= abs(rate) <= high}] if force > 0 else []
+
+
+def _pull(recording: Recording) -> tuple[float, float, float] | None:
+    """Return an accelerometer's mean force across z, m/s^2, its radius, m, and the share of readings at a limit.
+
+    None where there is no reading, or no place off the axis is stated.
+    """
     accelerometer = recording.get("accelerometer")
     if accelerometer is None:
-        return []
+        return None
     sheet = recording.sheets["accelerometer"]
     radius = float(np.hypot(*sheet.position[:2])) if sheet.position is not None else 0.0
     present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
     if not radius > 1e-4 or not np.any(present):
-        return []
+        return None
     clipped = np.any(sheet.clipped(accelerometer.value)[present, :2], axis=1)
     force = float(np.hypot(*np.mean(accelerometer.value[present, :2], axis=0)))
-    bias = settings.accelerometer_bias + 0.05 * force
-    low = np.sqrt(max(force - 3 * bias, 0.0) / (radius + 2 * settings.mount))
-    high = np.sqrt((force + 3 * bias) / max(radius - 2 * settings.mount, 0.2 * radius))
-    high = np.inf if np.mean(clipped) > 0.05 else high
-    return [{k for k, rate in rates.items() if low <= abs(rate) <= high}] if force > 0 else []
+    return force, radius, float(np.mean(clipped))
 
 
 #: No disc is thrown with more spin, rad/s (docs/checking.md).
@@ -411,19 +423,11 @@ def _spin_readings(recording: Recording) -> tuple[FloatArray, BoolArray]:
 
 def _may_fold(recording: Recording, fold: float) -> bool:
     """Tell whether another sensor shows a rate that the magnetometer cannot show plainly."""
-    gyroscope, accelerometer = recording.get("gyroscope"), recording.get("accelerometer")
-    if gyroscope is not None:
-        z = np.abs(gyroscope.value[:, 2])
-        if np.any(np.isfinite(z)) and float(np.nanmedian(z)) > 0.45 * fold:
-            return True
-    if accelerometer is not None:
-        position = recording.sheets["accelerometer"].position
-        if position is not None and np.hypot(*position[:2]) > 1e-4:
-            present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
-            mean = np.mean(accelerometer.value[present, :2], axis=0) if np.any(present) else np.zeros(2)
-            if float(np.sqrt(np.hypot(*mean) / np.hypot(*position[:2]))) > 0.4 * fold:
-                return True
-    return False
+    z, _ = _spin_readings(recording)
+    if z.size and float(np.median(np.abs(z))) > 0.45 * fold:
+        return True
+    pull = _pull(recording)
+    return pull is not None and float(np.sqrt(pull[0] / pull[1])) > 0.4 * fold
 
 
 # ---------------------------------------------------------------------------------------------- methods

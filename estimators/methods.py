@@ -14,6 +14,7 @@ from discsim.errors import InputError, require_type
 from discsim.estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from discsim.estimators.fft import FftSettings, fft
 from discsim.estimators.fusion import (
+    FusionSettings,
     accelerometer_calibrated,
     compare_sensors,
     contradictions,
@@ -226,7 +227,8 @@ def _folded(recording: Recording, name: str) -> str:
     """
     if name not in BY_THE_FIELD or "magnetometer" not in recording:
         return ""
-    if not mostly_clipped(recording) or unfolding(recording) == (0, True):
+    # with the settings that `fusion` has asked with just before, so that it is not worked out again
+    if not mostly_clipped(recording) or unfolding(recording, FusionSettings()) == (0, True):
         return ""
     rate = 1.0 / recording.need("magnetometer").interval
     return (

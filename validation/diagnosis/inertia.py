@@ -100,8 +100,10 @@ def _wobble(recording: Recording) -> tuple[float, float, float, float] | None:
     # what stands still in the body, and what stands still beside it
     ratio, share = _best(np.column_stack([np.ones_like(y), turning]), course, psi, y)
     # what drifts there turns as a wobble of a ratio near 1 or 0 does, which is none beside such drifts
-    beside, _ = _best(np.column_stack([course, course * turning[:, None]]), course, psi, y)
-    return ratio, _AIR / max(spin, 1e-9), share if abs(ratio - beside) < _ALIKE else 0.0, size
+    if share > _READ:
+        beside, _ = _best(np.column_stack([course, course * turning[:, None]]), course, psi, y)
+        share = share if abs(ratio - beside) < _ALIKE else 0.0
+    return ratio, _AIR / max(spin, 1e-9), share, size
 
 
 def _best(still: ComplexArray, course: ComplexArray, psi: FloatArray, y: ComplexArray) -> tuple[float, float]:

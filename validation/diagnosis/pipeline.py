@@ -196,15 +196,18 @@ def _with_bends(found: Search, followed: Fit, problem: SearchProblem) -> Search:
     stack of effects beside them copies what nobody knows. Effects that stand for what is not stated are no such stack.
     """
     unstated = {candidate.id for candidate in stand_ins(found.recordings)}
+
+    def errors(of: Search) -> int:
+        return sum(candidate.id not in unstated for candidate in of.final.hypothesis.candidates)
+
     for _ in range(_BENDS):
-        left, named = leaves_more_than_noise(found), [one.id for one in found.final.hypothesis.candidates]
-        bent = with_bends_followed(found, followed) if left or named else None
+        left = leaves_more_than_noise(found)
+        bent = with_bends_followed(found, followed) if left or found.final.hypothesis.candidates else None
         if bent is None:
             break
-        most = 1 if left else len([id for id in named if id not in unstated])
+        most = 1 if left else errors(found)
         again = search(replace(problem, followed=bent), Anew(most + len(unstated), None if left else found))
-        errors = [one for one in again.final.hypothesis.candidates if one.id not in unstated]
-        if len(errors) > most or (leaves_more_than_noise(again) and not left):
+        if errors(again) > most or (leaves_more_than_noise(again) and not left):
             break
         followed, found = bent, again
     return found

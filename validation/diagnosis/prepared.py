@@ -11,6 +11,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.track_ends import flight_of
 from discsim.validation.identification.initial.smoothing import FEWEST
 from discsim.validation.identification.plants import plant_of
@@ -155,8 +156,7 @@ def _absent(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[s
 
 def _unplaced(recordings: Sequence[Recording]) -> Iterator[str]:
     """Yield what is taken for the accelerometer's place where nobody states it."""
-    sheets = [one.sheets["accelerometer"] for one in recordings if "accelerometer" in one.samples]
-    if any(sheet.position is None for sheet in sheets):
+    if unplaced(recordings):
         yield (
             "where the accelerometer sits (position_m) is not stated: the centre is taken, and where it does sit shows "
             "as accel.position_offset."

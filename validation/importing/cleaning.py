@@ -86,16 +86,15 @@ def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stampe
     found, said = _thawed(sensor, found, others, standing)
     notes += said
     if held is None:
-        here = found.select(~np.all(np.isnan(found.value), axis=1))
-        own = between_rows(here, others) if sensor == "magnetometer" else None
-        if own is None:
+        between = between_rows(found, others) if sensor == "magnetometer" else None
+        if between is None:
             return Cleaned(found, rate, tuple(notes))
+        found, own, row = between
         notes.append(
-            f"{sensor}: its readings come every {own.period / own.row:.2f} rows, at {1 / own.period:.4g} Hz in a log "
-            f"of {1 / own.row:.4g} Hz: they bear {_evenly(own.one_clock)}, at most a row before the row on which they "
-            "stand"
+            f"{sensor}: its readings come every {own.period / row:.2f} rows, at {1 / own.period:.4g} Hz in a log of "
+            f"{1 / row:.4g} Hz: they bear {own.even}, at most a row before the row on which they stand"
         )
-        return Cleaned(Readings(here.number, own.time, here.value), 1 / own.period, tuple(notes))
+        return Cleaned(found, 1 / own.period, tuple(notes))
     readings, period, said_of_it = _held(sensor, found, held, total, stamped)
     return Cleaned(readings, 1 / period, (*notes, said_of_it))
 
@@ -118,8 +117,9 @@ def _held(sensor: str, found: Readings, held: Held, total: int, stamped: bool) -
         time[0] = min(time[0], time[1] - period)  # it may stand since before the first row
         bear = f"it is read every {_ordinal(every)} row, in step with the log, and has the time of that row"
     else:
-        period, time, one_clock = own_times(fresh.time, written.astype(float), stands, row)
-        bear = f"what is left bears {_evenly(one_clock)}, at most a row before the row at which it first shows"
+        own = own_times(fresh.time, written.astype(float), stands, row)
+        period, time = own.period, own.time
+        bear = f"what is left bears {own.even}, at most a row before the row at which it first shows"
     per_row = "" if stamped else f" (rows taken as {1 / row:.4g} Hz)"
     said = (
         f"{sensor}: its readings stand on {stands:.2f} rows each (sample and hold): it runs at "
@@ -127,10 +127,6 @@ def _held(sensor: str, found: Readings, held: Held, total: int, stamped: bool) -
         f"repeat and are left out; {bear}"
     )
     return Readings(fresh.number, time, fresh.value), period, said
-
-
-def _evenly(one_clock: bool) -> str:
-    return "the even times of its own clock" if one_clock else "times as even as the rows allow"
 
 
 def _ordinal(number: int) -> str:

@@ -38,25 +38,32 @@ LESS = 0.95
 
 
 class OwnTimes(NamedTuple):
-    """A sensor's period and the rows between its readings, s, its times (n,), and whether they are one even clock's."""
+    """A sensor's period, s, the times (n,) of its readings, and whether one even clock explains them all."""
 
     period: float
-    row: float
     time: FloatArray
     one_clock: bool
 
+    @property
+    def even(self) -> str:
+        """What its times are, in words."""
+        return "the even times of its own clock" if self.one_clock else "times as even as the rows allow"
 
-def between_rows(found: Readings, others: Mapping[str, Readings]) -> OwnTimes | None:
-    """Return the times of a magnetometer that stands on some rows of a log, as its own clock has them.
+
+def between_rows(found: Readings, others: Mapping[str, Readings]) -> tuple[Readings, OwnTimes, float] | None:
+    """Return what a magnetometer reads on some rows of a log, when by its own clock, and the rows' spacing, s.
 
     ``others`` are all sensors of the log. None for one that is as fast as the log, that is read by its loop, or that
     has stamps of its own; where no other sensor stands on all rows; and where it turns no more evenly by its own times.
     """
+    found = found.select(~np.all(np.isnan(found.value), axis=1))
     if found.time.size < 2 * STRETCH:
         return None
     first, last = found.number[0], found.number[-1]
-    fastest = max((one.select((one.number >= first) & (one.number <= last)) for one in others.values()), key=_rows)
     whole = last - first + 1
+    if found.time.size == whole:
+        return None
+    fastest = max((one.select((one.number >= first) & (one.number <= last)) for one in others.values()), key=_rows)
     _, own, its = np.intersect1d(found.number, fastest.number, return_indices=True)
     if _rows(fastest) < EVERY_ROW * whole or own.size < EVERY_ROW * _rows(found):
         return None
@@ -70,8 +77,10 @@ def between_rows(found: Readings, others: Mapping[str, Readings]) -> OwnTimes | 
     stands = (whole - 1) / written.size
     if in_step(found.time / row, written, stands) is not None or np.all(written == written[0]):
         return None
-    period, time, one_clock = own_times(found.time, written.astype(float), stands, row)
-    return OwnTimes(period, row, time, one_clock) if _turns_evenly(found, time) else None
+    own_clock = own_times(found.time, written.astype(float), stands, row)
+    if not _turns_evenly(found, own_clock.time):
+        return None
+    return Readings(found.number, own_clock.time, found.value), own_clock, row
 
 
 def _rows(one: Readings) -> int:
@@ -123,10 +132,8 @@ def in_step(first_shown: FloatArray, written: IntArray, rows_per_reading: float)
     return every if rows.sum() >= IN_STEP and np.all(in_step) else None
 
 
-def own_times(
-    first_shown: FloatArray, written: FloatArray, rows_per_reading: float, row: float
-) -> tuple[float, FloatArray, bool]:
-    """Return a held sensor's period (s), the times (n,) of its readings, and whether one even clock explains them all.
+def own_times(first_shown: FloatArray, written: FloatArray, rows_per_reading: float, row: float) -> OwnTimes:
+    """Return when a sensor with a clock of its own took its readings.
 
     ``first_shown`` (n,) s are the times of the rows at which they first show, ``written`` (n - 1,) the rows between.
     A reading was taken within one row before the row at which it first shows. Where one clock lies within these rows, a
@@ -135,7 +142,7 @@ def own_times(
     """
     count = _counted(first_shown / row, written, rows_per_reading)
     if first_shown.size < 8:
-        return rows_per_reading * row, first_shown - row / 2, False
+        return OwnTimes(rows_per_reading * row, first_shown - row / 2, False)
     near = np.ones(count.size, dtype=np.bool_)
     for _ in range(4):
         slope, start = np.polyfit(count[near], first_shown[near] - first_shown[0], 1)
@@ -144,13 +151,13 @@ def own_times(
         near = np.abs(late - np.median(late)) <= 0.55 * row
     # where a row was lost, a reading shows a row or more later
     if np.mean(near) >= ONE_CLOCK:
-        return float(slope), np.asarray(first_shown - late - row / 2), True
+        return OwnTimes(float(slope), np.asarray(first_shown - late - row / 2), True)
     width = min(NEARBY, first_shown.size // 2 * 2 - 1)
     padded = np.pad(late, width // 2, mode="reflect", reflect_type="odd")
     smooth = np.convolve(padded, np.ones(width) / width, mode="valid")
     time = first_shown - late + smooth - row / 2
     time = np.clip(time, first_shown - 0.99 * row, first_shown)
-    return float(np.median(np.diff(time))), time, False
+    return OwnTimes(float(np.median(np.diff(time))), time, False)
 
 
 def _counted(first_shown: FloatArray, written: FloatArray, rows_per_reading: float) -> FloatArray:

@@ -20,7 +20,15 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import PLANTS
 from discsim.validation.identification.propagation import Column
 
-__all__ = ["CandidateEffect", "candidates_for", "free_candidate", "in_parameters", "parameters_of", "stand_ins"]
+__all__ = [
+    "CandidateEffect",
+    "candidates_for",
+    "free_candidate",
+    "in_parameters",
+    "parameters_of",
+    "stand_ins",
+    "unplaced",
+]
 
 
 @dataclass(frozen=True)
@@ -108,12 +116,14 @@ def candidates_for(recordings: Sequence[Recording], effects: Competing = CATALOG
     return tuple(candidates)
 
 
-def stand_ins(recordings: Sequence[Recording], effects: Competing = CATALOGUED) -> tuple[CandidateEffect, ...]:
+def unplaced(recordings: Sequence[Recording]) -> bool:
+    """Tell whether nobody states where the accelerometer of some recording sits."""
+    return any("accelerometer" in one.samples and one.sheets["accelerometer"].position is None for one in recordings)
+
+
+def stand_ins(recordings: Sequence[Recording]) -> tuple[CandidateEffect, ...]:
     """Return the candidates that stand for what nobody stated, and are no errors: where the accelerometer sits."""
-    sheets = [one.sheets["accelerometer"] for one in recordings if "accelerometer" in one.samples]
-    if all(sheet.position is not None for sheet in sheets):
-        return ()
-    rows = [row for row in available(recordings, effects) if row.type is PositionOffset]
+    rows = [row for row in available(recordings) if row.type is PositionOffset] if unplaced(recordings) else []
     return tuple(free_candidate(row.id, plant=recordings[0].plant) for row in rows)
 
 

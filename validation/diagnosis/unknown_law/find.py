@@ -161,18 +161,17 @@ def find_law(
     """Return the law that explains what the catalogue does not, or None where none holds on held-out recordings.
 
     ``relaxed_fit`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own``
-    the parameters that the recordings leave open without any effect, beside which what nobody stated of them is open,
-    too, ``noise`` that of the relaxed fit. ``instead``
-    asks for a law that does better than the effects of the best fit, which then would explain the recordings;
-    ``moves_out`` for one of what moves in a body, by the pull that it changes.
+    the parameters that the recordings leave open without any effect (what nobody stated of them is open beside these),
+    ``noise`` that of the relaxed fit. ``instead`` asks for a law that does better than the effects of the best fit,
+    which then would explain the recordings; ``moves_out`` for one of what moves in a body, by the pull that it changes.
     """
     plant = relaxed_fit.plant
     if relaxed_fit.from_release:
         return None  # a path alone leaves no motion beside the data
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
-    unstated = tuple(q for candidate in stand_ins(recordings) for q in parameters_of(candidate))
-    own = (*own, *unstated)
+    unstated = [q for candidate in stand_ins(recordings) for q in parameters_of(candidate)]
+    own = [*own, *unstated]
     base = (
         best
         if not best.hypothesis.candidates and not unstated
