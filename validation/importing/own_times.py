@@ -30,8 +30,9 @@ IN_STEP = 300
 #: share of the rows of a log on which its fastest sensor stands; where several take turns each has a stamp of its own
 EVERY_ROW = 0.95
 #: readings that are fitted by one turning at a time (a spin that dies by a third in a second stays in step over them),
-#: stretches of them at most, and how finely the turning is sought: steps of a quarter of what tells two apart
-STRETCH, MOST, FINENESS = 16, 100, 4
+#: stretches of them at most, and how finely the turning is sought: steps of a sixteenth of what tells two apart. Beside
+#: a step of a quarter the nearest turning leaves up to 6 % of the changes, as much as wrong times do
+STRETCH, MOST, FINENESS = 16, 100, 16
 #: times of rows are left where even ones leave this share of the changes: at rest, where noise is all that is left,
 #: both leave the same within two per cent
 LESS = 0.95

@@ -5,6 +5,8 @@ import pytest
 from support.made_logs import made_log, three, write_table
 
 from discsim.validation.importing.imported_log import import_log
+from discsim.validation.importing.own_times import between_rows
+from discsim.validation.importing.readings import Readings
 
 ROW = 0.01  # s
 
@@ -53,3 +55,22 @@ def test_a_field_that_the_log_s_loop_reads_keeps_the_times_of_the_rows(tmp_path,
     present = np.all(np.isfinite(field.value), axis=1)
     np.testing.assert_allclose(np.diff(field.t[present]), np.diff(true), atol=1e-9)
     assert "its readings come every" not in found.summary()
+
+
+@pytest.mark.parametrize("read_by_the_log", [False, True])
+@pytest.mark.parametrize("spin", [21.0, 38.3, 46.4, 55.2, 63.5, 72.0])
+def test_whose_clock_a_field_s_times_are_is_told_at_any_spin(spin, read_by_the_log):
+    rng = np.random.default_rng(round(spin))
+    rows = np.arange(0.0, 3.0, ROW)
+    sampled = np.arange(0.0, 3.0, 1.0 / 80.0)
+    latest = np.searchsorted(sampled, rows + 1e-9) - 1
+    number = np.flatnonzero(np.diff(latest, prepend=-1))[3:]
+    read = rows[number] if read_by_the_log else sampled[latest[number]]
+    phase = spin * (read - 0.002 * read**2)
+    field = np.stack([20.0 * np.cos(phase), -20.0 * np.sin(phase), np.full(read.size, 40.0)], axis=1)
+    field += 0.5 * rng.standard_normal(field.shape)
+    others = {"gyroscope": Readings(np.arange(rows.size), rows, np.zeros((rows.size, 3)))}
+    found = between_rows(Readings(number, rows[number], field), others)
+    assert (found is None) == read_by_the_log
+    if found is not None:
+        np.testing.assert_allclose(np.diff(found[0].time), np.diff(read), atol=1e-4)
