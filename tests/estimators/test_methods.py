@@ -11,7 +11,8 @@ import pytest
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.estimators import METHODS, best, estimate
-from discsim.estimators.methods import all_methods, clock_notes, folding_notes, sampling_notes
+from discsim.estimators.methods import all_methods
+from discsim.estimators.notes import clock_notes, folding_notes, sampling_notes
 from discsim.recording import Recording, Samples, SensorSheet
 
 SHEETS = {

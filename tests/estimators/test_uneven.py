@@ -9,7 +9,7 @@ import pytest
 from support.spinning_sensor import MPU9250, Faults, Spin, move, record, without
 
 from discsim.estimators import METHODS, estimate
-from discsim.estimators.methods import sampling_notes
+from discsim.estimators.notes import sampling_notes
 from discsim.estimators.streaming import StreamingRate
 from discsim.recording import Recording, Samples, SensorSheet
 

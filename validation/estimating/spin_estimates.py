@@ -11,19 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from discsim.errors import InputError, require_type
-from discsim.estimators.fusion import contradictions
-from discsim.estimators.methods import (
-    METHODS,
-    Options,
-    all_methods,
-    axis_notes,
-    best_of,
-    clock_notes,
-    estimate,
-    field_notes,
-    folding_notes,
-    sampling_notes,
-)
+from discsim.estimators.methods import METHODS, Options, all_methods, best_of, estimate
+from discsim.estimators.notes import notes_on
 from discsim.estimators.rate import YawRate
 from discsim.estimators.usable import usable
 from discsim.files import write_pieces, write_text
@@ -196,9 +185,7 @@ def estimate_all(
 def all_notes(recording: Recording) -> list[str]:
     """Return a line for all that a reader must know of a recording before believing an estimate from it."""
     sound = usable(recording)
-    data = sound.recording
-    about = (sampling_notes, folding_notes, field_notes, axis_notes, contradictions, clock_notes)
-    return [*sound.notes, *(line for notes in about for line in notes(data))]
+    return [*sound.notes, *notes_on(sound.recording)]
 
 
 def rate_csv(rates: Sequence[YawRate]) -> Iterator[str]:
