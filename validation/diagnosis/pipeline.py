@@ -180,8 +180,7 @@ def _law_before_effects(
     begun = screened(
         SearchProblem(ready.fitted, as_stated=ready.meant, followed=moving, free=free, effects=question.effects)
     )
-    base, own, noise = begun.base, begun.own, begun.relaxed_noise
-    return begun, find_law(begun.relaxed_fit, base, own, noise, ready.fitted, moves_out=moving is not None)
+    return begun, find_law(begun, moves_out=moving is not None)
 
 
 #: rounds in which segments are halved where the air's moment bends within them

@@ -70,14 +70,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     left = leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
     if left or _may_be_a_copy(found):
         progress("looking for a law", 4, 5)
-        law = find_law(
-            found.relaxed_fit,
-            found.final,
-            found.own,
-            found.relaxed_noise,
-            tried.prepared.fitted,
-            instead=not left,
-        )
+        law = find_law(found, instead=not left)
     verdict: Verdict
     if left or law is not None:
         verdict = "unexplained"

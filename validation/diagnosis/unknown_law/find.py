@@ -15,7 +15,6 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.kind import BOARD
-from discsim.recording import Recording
 from discsim.validation.diagnosis.result import Law
 from discsim.validation.diagnosis.selection.candidates import parameters_of, stand_ins
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
@@ -148,30 +147,21 @@ def _quick(e: FloatArray) -> float:
 _OF_WHAT_MOVES = frozenset([("accelerometer", "settling"), ("accelerometer", "warming"), ("accelerometer", "drift")])
 
 
-def find_law(
-    relaxed_fit: Fit,
-    best: ContinuousFit,
-    own: Sequence[Parameter],
-    noise: NoiseModel,
-    recordings: Sequence[Recording],
-    *,
-    instead: bool = True,
-    moves_out: bool = False,
-) -> FoundLaw | None:
+def find_law(search: Search, *, instead: bool = True, moves_out: bool = False) -> FoundLaw | None:
     """Return the law that explains what the catalogue does not, or None where none holds on held-out recordings.
 
-    ``relaxed_fit`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own``
-    the parameters that the recordings leave open without any effect (what nobody stated of them is open beside these),
-    ``noise`` that of the relaxed fit. ``instead`` asks for a law that does better than the effects of the best fit,
-    which then would explain the recordings; ``moves_out`` for one of what moves in a body, by the pull that it changes.
+    ``search`` holds the best fit with effects of the catalogue, or without any. What nobody stated of the recordings is
+    open under a law. ``instead`` asks for a law that does better than the effects of the best fit, which then would
+    explain the recordings; ``moves_out`` for one of what moves in a body, by the pull that it changes.
     """
+    relaxed_fit, best, noise, recordings = search.relaxed_fit, search.final, search.relaxed_noise, search.recordings
     plant = relaxed_fit.plant
     if relaxed_fit.from_release:
         return None  # a path alone leaves no motion beside the data
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
     unstated = [q for candidate in stand_ins(recordings) for q in parameters_of(candidate)]
-    own = [*own, *unstated]
+    own = [*search.own, *unstated]
     base = (
         best
         if not best.hypothesis.candidates and not unstated
@@ -219,8 +209,7 @@ class LawOfAll:
 
     def __call__(self, search: Search) -> bool:
         """Tell whether one does."""
-        args = search.relaxed_fit, search.base, search.own, search.relaxed_noise, search.recordings
-        law = find_law(*args, instead=False)
+        law = find_law(search.at_base(), instead=False)
         self.found = law if law is not None and law.explains_all else None
         return self.found is not None
 

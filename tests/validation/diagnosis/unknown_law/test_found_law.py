@@ -33,14 +33,11 @@ from discsim.validation.challenge.cases.off_catalogue import (
     Warming,
 )
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection import stepwise
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.next_effect import next_effect
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw, find_law
-from discsim.validation.identification.noise import estimate_noise
-from discsim.validation.identification.stated_parameters import stated_parameters
 
 MODULE = Instruments.from_parts("mpu9250")
 FIELD = Environment(magnetic_field=np.array([30.1, -4.3, 39.2]), gravity=9.8)
@@ -59,12 +56,9 @@ def coasting(secrets: Sequence[OffCatalogue | None], seconds: float = 5.0) -> li
 
 
 def law_of(recordings: Sequence[Recording]) -> FoundLaw | None:
-    own = stated_parameters(recordings)
-    relaxed_fit = relaxed(recordings, own)
-    noise = estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
-    base = continuous_fit(relaxed_fit, Hypothesis(), own, noise, {}, iterations=6, polish=1)
+    begun = screened(SearchProblem(recordings))
     with limited():
-        return find_law(relaxed_fit, base, own, noise, recordings)
+        return find_law(begun)
 
 
 def within(found: FoundLaw, name: str, truth: float, sigmas: float = 3.0) -> bool:
