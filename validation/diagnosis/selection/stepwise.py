@@ -140,8 +140,10 @@ def _selected_forward(found: Search, of_use: int | None, law: Callable[[Search],
                 continue
         if better is None or len(better.hypothesis.candidates) > _most(found, better, most):
             break
-        if step == 0 and law is not None and _leaves_much_of_a_sensor(found, better) and law(found):
-            return replace(found, final=better)
+        if step == 0 and law is not None and _leaves_much_of_a_sensor(found, better):
+            told = replace(found, final=better)
+            if law(told):
+                return told
         found, better = with_losses_recounted(found, with_best_instant(found, better))
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there

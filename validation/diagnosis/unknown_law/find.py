@@ -19,6 +19,7 @@ from discsim.validation.diagnosis.result import Law
 from discsim.validation.diagnosis.selection.candidates import parameters_of, stand_ins
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.next_effect import next_effect
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws, swinging_in_words
@@ -192,9 +193,12 @@ def find_law(search: Search, *, instead: bool = True, moves_out: bool = False) -
         law = _believed(*_more_sensor_terms(start, own, own_at, fitted, term, about), base, at, start.noise)
     else:
         law = _believed(*_more_terms(start, own, own_at, fitted, term, at), base, at, start.noise)
-    if law is None or (instead and _priced(law.fitted) + SELECTION.entry > best.score):
-        return None
-    return law
+    return None if law is None or (instead and not _does_better(law, best)) else law
+
+
+def _does_better(law: FoundLaw, fitted: ContinuousFit) -> bool:
+    """Tell whether a law is worth its price over a fit with effects."""
+    return _priced(law.fitted) + SELECTION.entry <= fitted.score
 
 
 #: kinds of a sensor's terms that no effect passes for: what turns or swings, and a play, leave what is seen as such
@@ -208,9 +212,16 @@ class LawOfAll:
         self.found: FoundLaw | None = None
 
     def __call__(self, search: Search) -> bool:
-        """Tell whether one does."""
+        """Tell whether one does, where no further effect does as well beside the one that the search has come to.
+
+        A scale of a sensor and a drift are two effects of the catalogue, and a law of two terms says the same.
+        """
         law = find_law(search.at_base(), instead=False)
-        self.found = law if law is not None and law.explains_all else None
+        if law is None or not law.explains_all:
+            return False
+        _, with_one_more = next_effect(search, search.final, len(search.final.hypothesis.candidates))
+        if with_one_more is None or _does_better(law, with_one_more):
+            self.found = law
         return self.found is not None
 
 

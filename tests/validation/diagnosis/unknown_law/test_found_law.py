@@ -397,6 +397,15 @@ def test_a_play_far_from_the_data_has_its_law_before_a_stack_of_errors_is_tried(
 
 
 @pytest.mark.slow
+def test_two_errors_of_a_sensor_are_no_law_of_two_terms():
+    """A scale is a power of one of the reading, and a drift a warming that takes longer than the throw."""
+    found = diagnose([recordings(Request(643171).draw())[:3]], ["throws"]).diagnosis
+    assert found.law is None
+    assert found.verdict == "explained"
+    assert {effect.id for effect in found.effects} == {"accel.scale", "accel.bias_drift"}
+
+
+@pytest.mark.slow
 def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_told():
     """The pull on the accelerometer changes by a per cent while lift turns the body by what is fixed in it."""
     slides = recordings(Request(633010).draw())[:3]
