@@ -37,6 +37,7 @@ from discsim.validation.identification.sensor_model import Values
 __all__ = [
     "LostSamples",
     "Shifted",
+    "begun_later",
     "dropped_accelerometer",
     "dropped_magnetometer",
     "loses_samples",
@@ -87,6 +88,7 @@ def _losses(id: str, trajectories: Sequence[Trajectory], sensor: str) -> tuple[C
             continue
         n, gone = float(counts.size), float(counts[-1])
         lost, sampled = lost + gone, sampled + n + gone
+    sampled = max(sampled, 1.0)
     share = lost / sampled
     if lost:
         cost = price_of_places(lost, share)
@@ -270,9 +272,25 @@ def recounted(fit: Fit, sensor: str) -> tuple[Shifted, float] | None:
     counts = [[t.lost[sensor] for t in some.trajectories if sensor in t.lost] for some in (fit, whole)]
     if len(counts[0]) == len(counts[1]) and all(np.array_equal(a, b) for a, b in zip(*counts, strict=True)):
         return None
-    _, was = _losses(_id_of(sensor), fit.trajectories, sensor)
-    candidate, cost = _losses(_id_of(sensor), whole.trajectories, sensor)
-    return Shifted(ScreenedCandidate(candidate, gain, {}), whole, cost), cost - was
+    return _shifted(fit, whole, sensor, gain)
+
+
+def begun_later(fit: Fit, sensor: str, recording: int, count: int) -> tuple[Shifted, float]:
+    """Return the losses of a sensor, and so many before the first reading of a recording; how much their price grows.
+
+    A motion that goes by the sensor does not tell that its first reading is the second one that was taken.
+    """
+    some = list(fit.trajectories)
+    known = some[recording].lost.get(sensor, np.zeros(len(some[recording].recording.samples[sensor])))
+    some[recording] = replace(some[recording], lost={**some[recording].lost, sensor: known + count})
+    return _shifted(fit, replace(fit, trajectories=tuple(some)), sensor, 0.0)
+
+
+def _shifted(before: Fit, after: Fit, sensor: str, gain: float) -> tuple[Shifted, float]:
+    """Return the losses of a fit as a candidate, with a gain, and how much dearer than those of one before they are."""
+    _, was = _losses(_id_of(sensor), before.trajectories, sensor)
+    candidate, cost = _losses(_id_of(sensor), after.trajectories, sensor)
+    return Shifted(ScreenedCandidate(candidate, gain, {}), after, cost), cost - was
 
 
 def _counted_in_own_noise(fit: Fit, sensor: str, noise: NoiseModel) -> tuple[Fit, float, float]:

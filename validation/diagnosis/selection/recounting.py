@@ -9,8 +9,10 @@ from dataclasses import replace
 
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
-from discsim.validation.diagnosis.detectors.dropped_samples import recounted
+from discsim.effects.setup import TimeOffset
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, begun_later, recounted
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 
@@ -27,6 +29,7 @@ def with_losses_recounted(found: Search, current: ContinuousFit) -> tuple[Search
     for sensor, id in _LOST.items():
         if any(candidate.id == id for candidate in current.hypothesis.candidates):
             found, current = _recounted(found, current, sensor)
+            found, current = _begun_later(found, current, sensor)
     return found, current
 
 
@@ -36,18 +39,52 @@ def _recounted(found: Search, current: ContinuousFit, sensor: str) -> tuple[Sear
         again = recounted(current.fit, sensor)
         if again is None:
             break
-        shifted, dearer = again
-        candidates = current.hypothesis.candidates
-        hypothesis = Hypothesis(tuple(shifted.screened.candidate if c.id == _LOST[sensor] else c for c in candidates))
-        start = replace(current.fit, trajectories=shifted.trajectories)
-        fitted = continuous_fit(start, hypothesis, found.own, current.fit.noise, values_of_fit(current))
-        fitted = found.with_cost(fitted, dearer)
+        fitted = _fitted(found, current, current.hypothesis, sensor, again)
         if not fitted.score < current.score:
             break
-        trajectories = tuple(
-            replace(one, lost={**one.lost, **other.lost})
-            for one, other in zip(found.relaxed_fit.trajectories, shifted.trajectories, strict=True)
-        )
-        relaxed_fit = replace(found.relaxed_fit, trajectories=trajectories)
-        found, current = replace(found, relaxed_fit=relaxed_fit, cost=found.cost + dearer), fitted
+        found, current = _taken(found, sensor, again), fitted
     return found, current
+
+
+def _begun_later(found: Search, current: ContinuousFit, sensor: str) -> tuple[Search, ContinuousFit]:
+    """Return a search and its fit without times of a losing sensor that are early in a recording by whole samples.
+
+    Samples that were lost before the first reading that a recording has make all of its times early by as many.
+    """
+    for candidate in current.hypothesis.candidates:
+        own = tuple(candidate.recordings or ())
+        if (candidate.row.type, candidate.row.acts_on, len(own)) != (TimeOffset, sensor, 1):
+            continue
+        recording = own[0]
+        rate_hz = current.fit.trajectories[recording].recording.sheets[sensor].rate_hz
+        [offset] = [v for q, v in zip(current.fit.parameters, current.fit.at, strict=True) if q.group == candidate.id]
+        if (count := round(-offset * rate_hz)) < 1:
+            continue
+        again = begun_later(current.fit, sensor, recording, count)
+        fitted = _fitted(found, current, current.hypothesis.without(candidate), sensor, again)
+        if fitted.score < current.score + price(candidate):
+            return _taken(found, sensor, again), fitted
+    return found, current
+
+
+def _fitted(
+    found: Search, current: ContinuousFit, hypothesis: Hypothesis, sensor: str, again: tuple[Shifted, float]
+) -> ContinuousFit:
+    """Return the fit of a hypothesis with other losses of a sensor, which are dearer by so much."""
+    shifted, dearer = again
+    candidates = hypothesis.candidates
+    counted = Hypothesis(tuple(shifted.screened.candidate if c.id == _LOST[sensor] else c for c in candidates))
+    start = replace(current.fit, trajectories=shifted.trajectories)
+    fitted = continuous_fit(start, counted, found.own, current.fit.noise, values_of_fit(current))
+    return found.with_cost(fitted, dearer)
+
+
+def _taken(found: Search, sensor: str, again: tuple[Shifted, float]) -> Search:
+    """Return a search whose relaxed fit holds other losses of a sensor."""
+    shifted, dearer = again
+    trajectories = tuple(
+        replace(one, lost={**one.lost, sensor: other.lost[sensor]}) if sensor in other.lost else one
+        for one, other in zip(found.relaxed_fit.trajectories, shifted.trajectories, strict=True)
+    )
+    relaxed_fit = replace(found.relaxed_fit, trajectories=trajectories)
+    return replace(found, relaxed_fit=relaxed_fit, cost=found.cost + dearer)

@@ -141,9 +141,9 @@ def _selected_forward(found: Search, of_use: int | None, law: Callable[[Search],
         if better is None or len(better.hypothesis.candidates) > _most(found, better, most):
             break
         if step == 0 and law is not None and _leaves_much_of_a_sensor(found, better):
-            told = replace(found, final=better)
-            if law(told):
-                return told
+            beside = replace(found, final=better)
+            if law(beside):
+                return beside
         found, better = with_losses_recounted(found, with_best_instant(found, better))
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there

@@ -21,6 +21,7 @@ from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.detectors import dropped_samples
 from discsim.validation.diagnosis.detectors.dropped_samples import (
+    begun_later,
     dropped_accelerometer,
     dropped_magnetometer,
     recounted,
@@ -276,6 +277,21 @@ def test_counts_of_a_magnetometer_are_mended_by_the_motion_too() -> None:
     anew = recounted(replace(followed, trajectories=wrong), "magnetometer")
     assert_mended(anew, found.trajectories, late, "magnetometer")
     assert recounted(relaxed_fit(), "magnetometer") is None
+
+
+def test_samples_lost_before_the_first_reading_count_in_that_recording_and_have_their_price() -> None:
+    fit = relaxed_fit()
+    shifted, dearer = begun_later(fit, "magnetometer", 0, 2)
+    first, *others = shifted.trajectories
+    assert np.all(first.lost["magnetometer"] == 2.0)
+    assert all("magnetometer" not in one.lost for one in others)
+    count = len(fit.trajectories[0].recording.samples["magnetometer"])
+    [(name, share, _)] = shifted.screened.candidate.fixed_values
+    assert (name, share) == ("fraction", pytest.approx(2.0 / (count + 2.0)))
+    assert dearer == pytest.approx(2.0 * 2.0 * (1.0 - np.log(share)))
+    again, dearer = begun_later(replace(fit, trajectories=shifted.trajectories), "magnetometer", 0, 1)
+    assert np.all(again.trajectories[0].lost["magnetometer"] == 3.0)
+    assert dearer > 0.0
 
 
 def test_a_motion_that_is_known_to_a_line_tells_what_was_lost_and_the_noise() -> None:
