@@ -116,8 +116,9 @@ def failed_on_one_axis(value: FloatArray) -> BoolArray:
         # counts that became SI and counts again are whole to within their last digits
         decimals = bool(np.any(np.abs(seen - np.rint(seen)) > WRITTEN * np.abs(seen)))
         codes = np.concatenate([SURELY, ENDS, PERHAPS]) if decimals else np.concatenate([SURELY, PERHAPS])
-        for code in codes:
-            seen[np.abs(seen - code) <= WRITTEN * abs(code)] = code
+        codes = np.unique(codes)
+        nearest = codes[np.searchsorted(0.5 * (codes[1:] + codes[:-1]), seen)]
+        seen = np.where(np.abs(seen - nearest) <= WRITTEN * np.abs(nearest), nearest, seen)
         for code in codes[np.isin(codes, seen)]:
             failed[there[_of_no_reading(seen, float(code), codes)], axis] = True
     return failed

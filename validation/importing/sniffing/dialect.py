@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import islice, product
 from pathlib import Path
 
@@ -169,11 +170,10 @@ def _separators(path: Path, sample: list[str], base: Layout) -> tuple[Layout, in
     lists = any(_LIST.search(line) for line in sample)
     best, best_score, width = base, 0.0, 0
     quoted = any(re.search(r"\"[+-]?\d+,\d", line) for line in sample)  # a comma within quotes is no separator
-    candidates = product((",", ";", "\t", "|", "blank"), (".", ","), ("", ",", ".", "'", "\u00a0", "\u202f", " "))
+    marks = [mark for mark in (",", ".", "'", "\u00a0", "\u202f", " ") if _groups_digits(mark, sample)]
+    candidates = product((",", ";", "\t", "|", "blank"), (".", ","), ("", *marks))
     for separator, decimal, thousands in candidates:
         if thousands == decimal or (separator in (decimal, thousands) and not quoted):
-            continue
-        if thousands and not any(re.search(rf"\d{re.escape(thousands)}\d{{3}}", line) for line in sample):
             continue
         if separator != "blank" and not any(separator in line for line in sample):
             continue
@@ -186,6 +186,12 @@ def _separators(path: Path, sample: list[str], base: Layout) -> tuple[Layout, in
     if best_score == 0.0:
         raise InputError.at(path, None, _no_rows(sample[0] if sample else ""))
     return best, width
+
+
+def _groups_digits(mark: str, sample: list[str]) -> bool:
+    """Tell whether three digits follow a digit and a mark in any line, as behind thousands."""
+    grouped = re.compile(rf"\d{re.escape(mark)}\d{{3}}")
+    return any(grouped.search(line) for line in sample)
 
 
 def _score(layout: Layout, sample: list[str]) -> tuple[float, int]:
@@ -207,8 +213,14 @@ def _share(cells: Sequence[str], layout: Layout) -> float:
 
 def _is_number(cell: str, layout: Layout) -> bool:
     """Tell a number in this layout, strictly: a point is no number's where the decimal mark is a comma."""
-    point = re.escape(layout.decimal)
-    return re.fullmatch(rf"[+-]?(\d+({point}\d*)?|{point}\d+)([eE][+-]?\d+)?", cell, re.ASCII) is not None
+    return _number(layout.decimal).fullmatch(cell) is not None
+
+
+@cache
+def _number(decimal: str) -> re.Pattern[str]:
+    """Return what a number with this decimal mark looks like."""
+    point = re.escape(decimal)
+    return re.compile(rf"[+-]?(\d+({point}\d*)?|{point}\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def _records(bare: Iterable[tuple[int, str]], width: int, layout: Layout) -> Iterator[tuple[int, str]]:

@@ -130,35 +130,49 @@ def _rotations(turn: FloatArray) -> FloatArray:
     """Return the matrices (n, 3, 3) that turn a vector by minus these rotation vectors (n, 3)."""
     angle = np.linalg.norm(turn, axis=1)
     axis = -turn / np.maximum(angle, 1e-12)[:, None]
-    cross = np.zeros((len(turn), 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
-    cross -= np.transpose(cross, (0, 2, 1))
-    return np.asarray(
-        np.eye(3) + np.sin(angle)[:, None, None] * cross + (1 - np.cos(angle))[:, None, None] * (cross @ cross)
-    )
+    sine, cosine = np.sin(angle), np.cos(angle)
+    found: FloatArray = ((1.0 - cosine)[:, None] * axis)[:, :, None] * axis[:, None, :]
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[:, i, i] += cosine
+        found[:, i, j] -= sine * axis[:, k]
+        found[:, j, i] += sine * axis[:, k]
+    return found
 
 
 def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
+    """Return what a worth leaves of the vector's changes, by each of some ways W (3, 3) to lay its axes.
+
+    A way enters linearly: W a - R W b of vectors a after and b before a rotation R is ``parts`` times W's elements, so
+    that sums of squares over all steps are taken once for all ways.
+    """
     chosen = _chosen(steps, worth)
     if chosen is None:
         return []
     before, after, turn = chosen
     rotation = _rotations(turn * worth)
     design = (np.eye(3) - rotation).reshape(-1, 3)
-    inverse = np.linalg.pinv(design, rcond=1e-3)
+    normal = design.T @ design
     change = float(np.sqrt(np.mean((after - before) ** 2))) or 1.0
     sizes = np.linalg.norm(before, axis=1)
     limit, usual = OFFSET * float(np.max(sizes)), float(np.median(sizes)) or 1.0
-    found: list[Fit] = []
-    for way in ways:
-        turned = np.einsum("nij,nj->ni", rotation, before @ way.T)
-        left = (after @ way.T - turned).reshape(-1)
-        offset = inverse @ left
-        offset *= min(1.0, limit / max(float(np.linalg.norm(offset)), 1e-300))
-        ratio = float(np.sqrt(np.mean((left - design @ offset) ** 2))) / change
-        size = float(np.median(np.linalg.norm(before @ way.T - offset, axis=1))) / usual
-        found.append(Fit(ratio, way, worth, offset, size=max(size, 1e-6)))
-    return found
+    elements = np.stack([np.ravel(way) for way in ways], axis=1)
+    parts = np.eye(3)[:, :, None] * after[:, None, None, :] - rotation[:, :, :, None] * before[:, None, None, :]
+    parts = parts.reshape(-1, 9)
+    seen_by = design.T @ parts @ elements
+    # squared, what a singular value of 1e-3 of the largest is
+    offset = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ seen_by
+    offset *= np.minimum(1.0, limit / np.maximum(np.linalg.norm(offset, axis=0), 1e-300))
+    squares = (
+        np.sum(elements * (parts.T @ parts @ elements), axis=0)
+        - 2.0 * np.sum(offset * seen_by, axis=0)
+        + np.sum(offset * (normal @ offset), axis=0)
+    )
+    ratios = np.sqrt(np.maximum(squares, 0.0) / len(design)) / change
+    turned_back = np.stack([way.T @ one for way, one in zip(ways, offset.T, strict=True)], axis=1)
+    lengths = sizes[:, None] ** 2 - 2.0 * before @ turned_back + np.sum(offset**2, axis=0)
+    seen = np.sqrt(np.maximum(np.median(lengths, axis=0), 0.0)) / usual
+    found = zip(ratios.tolist(), ways, offset.T, seen.tolist(), strict=True)
+    return [Fit(ratio, way, worth, one, size=max(size, 1e-6)) for ratio, way, one, size in found]
 
 
 def best_worth(steps: Sequence[Steps], worths: Sequence[float]) -> Fit | None:
