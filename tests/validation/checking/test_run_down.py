@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.made import FIELD, RIG
+from support.thinned import one_in
 
 from discsim.disc import Rig
 from discsim.effects import Effect, effect
@@ -41,7 +42,7 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("sensors", [(), ("magnetometer",), ("gyroscope",)], ids=["all", "field", "gyroscope"])
-@pytest.mark.parametrize("slip", SLIPS)
+@pytest.mark.parametrize("slip", one_in(2, SLIPS))
 def test_a_slip_in_the_rigs_numbers_is_told_with_its_factor(slip, sensors):
     """Nothing was held against them: a fit took the friction for uncertain, or dry friction for what was missing."""
     numbers, told = SLIPS[slip]
@@ -66,7 +67,7 @@ def test_check_tells_it():
     ],
     ids=lambda hidden: hidden[0].id if hidden else "nothing",
 )
-@pytest.mark.parametrize("friction", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("friction", one_in(3, [2.0, 0.5, 1.0]))
 def test_what_a_bench_has_beside_its_stated_friction_is_no_slip(hidden, friction):
     """The largest that the blind test conceals, and friction that is known to a factor of two."""
     assert list(run_down_findings(stated(coast(*hidden), friction=friction))) == []

@@ -97,6 +97,7 @@ def test_an_interrupt_while_python_still_loads_is_one_line(tmp_path, module):
     assert script == "discsim.validation.start:main"
 
 
+@pytest.mark.slow
 def test_an_interrupt_where_python_drops_errors_is_heard_all_the_same():
     """One that fell into a collection of garbage was told by a traceback, and the command went on to its end."""
     code = """
@@ -407,6 +408,7 @@ class TestValidateOnesOwn:
         assert run(monkeypatch, "validate", "--quick", *subject, "--out", str(tmp_path / "report")) == 1
         assert "FAIL" in (tmp_path / "report" / "report.html").read_text()
 
+    @pytest.mark.slow
     def test_a_disc_throw_profile_and_recording_of_ones_own_with_limits_and_an_earlier_run(
         self, monkeypatch, tmp_path, capsys, short, short_profile
     ):

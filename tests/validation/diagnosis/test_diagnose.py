@@ -215,6 +215,7 @@ def power_law(rate: float, c: float, seconds: float) -> Motion:
     return Motion(t, none, none, none, attitude, spin, braking, FIELD)
 
 
+@pytest.mark.slow
 def test_a_brake_that_no_effect_describes_is_unexplained_and_told_as_a_law():
     c, rig = 0.012, Rig(RIG.Izz, 0.0, {"viscous_N_m_s": 1e-8})
     recordings = [coasting(power_law(rate, c, 4.0), rig, k) for k, rate in enumerate((60.0, 25.0))]

@@ -67,6 +67,7 @@ def test_rates_of_the_times_as_written_do_not_undo_what_was_counted():
     assert written_ratios(ready.agreeing) == pytest.approx([1.0, 1.0], abs=0.02)
 
 
+@pytest.mark.slow
 def test_of_one_recording_whose_rows_could_be_counted_another_is_asked_for():
     """Times as written had told of iron and a gyroscope's bias of -12 rad/s, and of a stretch that nothing drives."""
     diagnosis = diagnose([throws()[:1]], ["one"]).diagnosis

@@ -86,6 +86,7 @@ def test_a_field_so_strong_that_a_magnetometer_contradicts_all_others_is_a_law()
     assert w.value == pytest.approx(2.0 * np.pi * (100.0 - 60.3), abs=4.0 * w.sd)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_follows_no_formula_contradicts_the_others() -> None:
     diagnosis = pipeline.diagnose([mains_beside_a_rig([60.3, 57.1])], ["beside two cables"]).diagnosis
     assert diagnosis.law is None

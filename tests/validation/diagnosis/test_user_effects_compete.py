@@ -222,6 +222,7 @@ def braked(effect: UserEffect, rate: float, k: float) -> Recording:
     return record(motion, MODULE, rng, plant="spin_down", name=f"braked from {rate:g} rad/s", rig=RIG)
 
 
+@pytest.mark.slow
 def test_a_brake_of_the_users_own_is_named_where_it_acts_and_not_where_it_does_not(tmp_path):
     effect = loaded(tmp_path, BRAKE)
     outcome = diagnose([[braked(effect, rate, 2e-9) for rate in (60.0, 40.0)]], ["rig"], user_effects=[effect])

@@ -56,6 +56,7 @@ def error_and_deviations(fit: Fit) -> tuple[float, float, float]:
     return float(fit.at[0]) - WHEN, float(np.sqrt(fit.covariance[0, 0])), float(np.sqrt(own.covariance[0, 0]))
 
 
+@pytest.mark.slow
 def test_a_small_step_lies_within_two_standard_deviations_as_often_as_it_should():
     """Of twenty about nineteen; by the curvature of the dip that a fit stands in, fourteen."""
     error, curved, own = np.array([error_and_deviations(fitted(SMALL, seed)) for seed in range(20)]).T

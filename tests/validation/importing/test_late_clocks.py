@@ -126,6 +126,7 @@ def test_a_sensor_that_shows_the_spin_for_a_short_time_may_be_late_by_more_than_
     assert_allclose(late.late, 3.0, atol=0.06)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_that_is_refused_tells_the_clock_that_is_another_ones():
     """It told what drives the body alone, and to what the field would agree with it at the times as written."""
     recording = recorded(late=3.0)

@@ -327,6 +327,7 @@ def test_the_proposed_map_gives_the_same_recording_again(monkeypatch, tmp_path, 
     assert first == second
 
 
+@pytest.mark.slow
 def test_throws_are_taken_by_number_or_all(monkeypatch, tmp_path, capsys):
     log = made_log()
     twice = Log(

@@ -9,6 +9,7 @@ from discsim.errors import InputError
 from discsim.validation.planning.planned import Planned
 
 
+@pytest.mark.slow
 def test_a_plan_is_a_result_like_the_others():
     found = ds.plan(2, "driver", ["mpu9250"])
     assert isinstance(found, Planned)

@@ -201,6 +201,7 @@ def test_the_rolling_rocket_makes_seven_turns_by_its_field():
     assert np.isnan(count.reference)
 
 
+@pytest.mark.slow
 @real
 def test_the_command_writes_the_page_with_every_figure(tmp_path):
     out = tmp_path / "real-recordings"

@@ -139,6 +139,7 @@ def test_recordings_without_a_sensor_of_the_rate_cannot_be_compared():
     assert agreement_of(throws(module=MODULE, plant="free_spin", seconds=1.0), ["a", "b"]) is None
 
 
+@pytest.mark.slow
 def test_a_time_base_that_is_a_fifth_wrong_is_found_as_the_clock():
     answer = diagnose([spins(effect("clock.rate", ratio=0.82))], ["made"]).diagnosis
     assert answer.verdict == "explained"

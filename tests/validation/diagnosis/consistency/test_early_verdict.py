@@ -62,6 +62,7 @@ def test_throws_whose_velocity_nothing_tells_but_the_air_are_followed():
     assert contradiction_in(blind, ()) is None
 
 
+@pytest.mark.slow
 def test_a_magnetometer_of_another_throw_contradicts_the_rest(contradiction):
     assert contradiction is not None
     assert "magnetometer" in contradiction.blamed

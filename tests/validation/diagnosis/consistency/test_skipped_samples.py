@@ -32,6 +32,7 @@ def test_a_loop_is_found_beside_a_faster_part(period, seed):
     assert found.gain > 8.0
 
 
+@pytest.mark.slow
 def test_rows_lost_at_random_of_a_loop_that_is_off_its_rate_show_every_sample():
     """A loop of 9.4 ms that loses rows: no other loop is likelier in any of forty recordings."""
     gains = []

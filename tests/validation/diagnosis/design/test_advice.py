@@ -148,6 +148,7 @@ def test_what_happened_once_has_no_next_recording():
     assert "happened once" in in_words("event.impulse", None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "hidden", "rival"),
     [

@@ -146,6 +146,7 @@ def test_single_samples_of_a_part_with_its_own_clock_are_named_without_means():
         assert field.taken[0] == pytest.approx(field.taken[1])
 
 
+@pytest.mark.slow
 def test_counts_that_no_other_sensor_bears_out_are_not_believed():
     agreement = agreement_of(logged(), NAMES)
     assert row_times(loop.without_wobble(logged(), 1), NAMES, agreement) is None

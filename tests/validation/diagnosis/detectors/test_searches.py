@@ -195,6 +195,7 @@ def test_lost_samples_of_the_accelerometer_are_counted_by_the_motion_of_the_othe
     assert share == pytest.approx(0.02, abs=4.0 * sd)
 
 
+@pytest.mark.slow
 def test_lost_samples_are_counted_where_segments_have_followed_the_sensor_through_them() -> None:
     """Ten samples of 2000: by the motion that followed them none seemed lost, and a set was left unexplained."""
     fit = relaxed(recordings(draw_case(627025)))
@@ -264,6 +265,7 @@ def test_counts_that_are_right_stay_and_others_are_mended_by_the_motion() -> Non
     assert recounted(relaxed_fit(), "accelerometer") is None
 
 
+@pytest.mark.slow
 def test_counts_of_a_magnetometer_are_mended_by_the_motion_too() -> None:
     """Where the gyroscope clips, segments that follow the field take a loss for a turn: 2 of 240 blind cases."""
     fit = relaxed_fit((), (effect("mag.dropped_samples", fraction=0.03),))

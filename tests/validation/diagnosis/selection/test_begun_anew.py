@@ -67,6 +67,7 @@ def beside(fit: Fit, recording: int) -> Fit:
     return refit(replace(fit, at=np.array(at)), iterations=1)
 
 
+@pytest.mark.slow
 def test_a_wobble_beside_its_optimum_is_brought_there_and_no_other_is_moved():
     first, fit = settled()
     stuck = beside(fit, 1)

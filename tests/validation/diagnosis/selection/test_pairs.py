@@ -85,6 +85,7 @@ def test_where_no_effect_alone_is_worth_its_price_two_are_found_at_once():
     assert named([YAW], [CLOCK]) == [YAW.id, CLOCK.id]
 
 
+@pytest.mark.slow
 def test_a_pair_that_comes_near_the_data_and_leaves_more_than_noise_ends_no_search_for_two(monkeypatch):
     """Algebra about fits that follow the data tells a delay and a lag alike, and may rank another pair before both."""
     found = search(SearchProblem(throws([YAW], [effect("mag.clock_rate", ratio=0.997)])))
