@@ -52,12 +52,12 @@ def _begun_later(found: Search, current: ContinuousFit, sensor: str) -> tuple[Se
     Samples that were lost before the first reading that a recording has make all of its times early by as many.
     """
     for candidate in current.hypothesis.candidates:
-        own = tuple(candidate.recordings or ())
+        own = tuple(candidate.recordings or range(len(current.fit.trajectories)))
         if (candidate.row.type, candidate.row.acts_on, len(own)) != (TimeOffset, sensor, 1):
             continue
         recording = own[0]
         rate_hz = current.fit.trajectories[recording].recording.sheets[sensor].rate_hz
-        [offset] = [v for q, v in zip(current.fit.parameters, current.fit.at, strict=True) if q.group == candidate.id]
+        offset = values_of_fit(current)[(candidate.id, "offset_s"), candidate.recordings]
         if (count := round(-offset * rate_hz)) < 1:
             continue
         again = begun_later(current.fit, sensor, recording, count)
