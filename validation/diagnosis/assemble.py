@@ -96,6 +96,8 @@ def _named(
         values[q.name] = ParameterValue(float(value), float(error) if known else None)
     if candidate.row.regular is not None:
         values = _of_regular(final, candidate)
+    if _leans_unseen(found, candidate):
+        values = {name: ParameterValue(one.value, None) for name, one in values.items()}
     values.update({name: ParameterValue(value, sd) for name, value, sd in candidate.fixed_values})
     for name, value in candidate.shape_grid.items():
         values.setdefault(name, ParameterValue(float(value), None))
@@ -404,15 +406,25 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
 
 
+def _leans_unseen(found: Search, candidate: CandidateEffect) -> bool:
+    """Tell whether an effect is a lean of a rig's axis to a side that no magnetometer tells, but by its size."""
+    return candidate.row.type is AxisTilt and not any("magnetometer" in one.samples for one in found.recordings)
+
+
 def _leaning(found: Search) -> tuple[str, ...]:
     """Return what to say of an axis that leans where no magnetometer tells which way."""
-    leans = any(candidate.row.type is AxisTilt for candidate in found.final.hypothesis.candidates)
-    if not leans or any("magnetometer" in one.samples for one in found.recordings):
-        return ()
-    return (
-        "no magnetometer tells where north is: the rig's axis leans by the size of what is named, and nobody knows "
-        "which way.",
-    )
+    told = []
+    fit, errors = found.final.fit, standard_errors(found.final)
+    for candidate in found.final.hypothesis.candidates:
+        if _leans_unseen(found, candidate):
+            # of the two parts one takes all of the lean, and the other stays as it began
+            k = min((k for k, q in enumerate(fit.parameters) if q.group == candidate.id), key=lambda k: errors[k])
+            size, sd = np.degrees([abs(fit.at[k]), errors[k]])
+            told.append(
+                f"no magnetometer tells where north is: the rig's axis leans by {size:.3g} ± {sd:.1g} deg, and nobody "
+                "knows which way. It is written as a tilt to the north whose parts nothing determines."
+            )
+    return tuple(told[:1])
 
 
 def _out_of_balance(found: Search) -> tuple[str, ...]:

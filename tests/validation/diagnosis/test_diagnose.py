@@ -313,4 +313,5 @@ def test_an_axis_that_leans_is_named_once_where_no_magnetometer_tells_north():
     assert (named.id, named.recordings) == ("rig.axis_tilt", None)
     size = np.hypot(*(named.parameters[f"tilt_{way}_rad"].value for way in ("north", "east")))
     assert size == pytest.approx(np.hypot(lean.tilt_north_rad, lean.tilt_east_rad), abs=1e-3)
-    assert any("nobody knows which way" in warning for warning in outcome.warnings)
+    assert all(part.sd is None for part in named.parameters.values())
+    assert any(f"leans by {np.degrees(size):.3g} ± " in warning for warning in outcome.warnings)
