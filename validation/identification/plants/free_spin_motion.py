@@ -93,11 +93,12 @@ def _spinning(
     dw[0] = (Iyy - Izz) / Ixx * w[1] * w[2] + c * mx + s * my + state[16] - decay * w[0] - faster * w[1]
     dw[0] += a * w[0] + b * w[1]
     dw[0] += px + ux * px + uy * py
-    dw[1] = c * my - s * mx + state[17] - decay * w[1] + faster * w[0]
-    dw[1] += b * w[0] - a * w[1]
-    dw[1] += py + uy * px - ux * py
-    # all of these are moments, of which the rates are those about x_B: about y_B they turn another inertia
-    dw[1] = (Izz - Ixx) / Iyy * w[2] * w[0] + Ixx / Iyy * dw[1]
+    # all of these are moments, told by the rates about x_B that they make: about y_B they turn another inertia
+    y = Ixx / Iyy
+    dw[1] = (Izz - Ixx) / Iyy * w[2] * w[0] + y * c * my - y * s * mx + y * state[17] - y * decay * w[1]
+    dw[1] += y * faster * w[0]
+    dw[1] += y * b * w[0] - y * a * w[1]
+    dw[1] += y * py + y * uy * px - y * ux * py
     dw[2] = (Ixx - Iyy) / Izz * w[0] * w[1] + (state[4] + since * state[5]) * w[2]
     dw[2] += spin_step(p.event_spin_step, t, w[2])
 
