@@ -413,18 +413,17 @@ def _leans_unseen(found: Search, candidate: CandidateEffect) -> bool:
 
 def _leaning(found: Search) -> tuple[str, ...]:
     """Return what to say of an axis that leans where no magnetometer tells which way."""
-    told = []
+    lean = next((one for one in found.final.hypothesis.candidates if _leans_unseen(found, one)), None)
+    if lean is None:
+        return ()
     fit, errors = found.final.fit, standard_errors(found.final)
-    for candidate in found.final.hypothesis.candidates:
-        if _leans_unseen(found, candidate):
-            # of the two parts one takes all of the lean, and the other stays as it began
-            k = min((k for k, q in enumerate(fit.parameters) if q.group == candidate.id), key=lambda k: errors[k])
-            size, sd = np.degrees([abs(fit.at[k]), errors[k]])
-            told.append(
-                f"no magnetometer tells where north is: the rig's axis leans by {size:.3g} ± {sd:.1g} deg, and nobody "
-                "knows which way. It is written as a tilt to the north whose parts nothing determines."
-            )
-    return tuple(told[:1])
+    # of the two parts one takes all of the lean, and the other stays as it began
+    k = min((k for k, q in enumerate(fit.parameters) if q.group == lean.id), key=lambda k: errors[k])
+    size, sd = np.degrees([abs(fit.at[k]), errors[k]])
+    return (
+        f"no magnetometer tells where north is: the rig's axis leans by {size:.3g} ± {sd:.1g} deg, and nobody knows "
+        "which way. It is written as a tilt to the north whose parts nothing determines.",
+    )
 
 
 def _out_of_balance(found: Search) -> tuple[str, ...]:

@@ -43,6 +43,7 @@ __all__ = [
     "loses_samples",
     "price_of_places",
     "recounted",
+    "uncounted",
 ]
 
 
@@ -284,6 +285,16 @@ def begun_later(fit: Fit, sensor: str, recording: int, count: int) -> tuple[Shif
     known = some[recording].lost.get(sensor, np.zeros(len(some[recording].recording.samples[sensor])))
     some[recording] = replace(some[recording], lost={**some[recording].lost, sensor: known + count})
     return _shifted(fit, replace(fit, trajectories=tuple(some)), sensor, 0.0)
+
+
+def uncounted(fit: Fit, sensor: str) -> tuple[Fit, float]:
+    """Return a fit whose trajectories hold no losses of a sensor, and what theirs had cost."""
+    _, cost = _losses(_id_of(sensor), fit.trajectories, sensor)
+    trajectories = tuple(
+        replace(one, lost={other: counts for other, counts in one.lost.items() if other != sensor})
+        for one in fit.trajectories
+    )
+    return replace(fit, trajectories=trajectories), cost
 
 
 def _shifted(before: Fit, after: Fit, sensor: str, gain: float) -> tuple[Shifted, float]:

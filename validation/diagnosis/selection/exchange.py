@@ -29,6 +29,7 @@ from discsim.validation.identification.gauss_newton import Bars, merit_of
 __all__ = [
     "eliminated_backward",
     "exchanged",
+    "in_reach",
     "rivals_of",
     "takes_its_place",
     "tried_without",
@@ -37,7 +38,7 @@ __all__ = [
 ]
 
 
-def _in_reach(fitted: ContinuousFit) -> Bars:
+def in_reach(fitted: ContinuousFit) -> Bars:
     """Return what a refit beside a fit may stay above it and still come near by a price or a tie."""
     return Bars(merit_of(fitted.fit, fitted.fit.linears) + SELECTION.out_of_reach)
 
@@ -62,7 +63,7 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
             found.own,
             final.fit.noise,
             start,
-            bars=_in_reach(final),
+            bars=in_reach(final),
         )
         wide = found.with_cost(wide)
         if wide.score - final.score < scope_price(len(found.recordings)) and possible(wide):
@@ -84,7 +85,7 @@ def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEf
                 found.own,
                 current.fit.noise,
                 values_of_fit(current),
-                bars=_in_reach(current),
+                bars=in_reach(current),
             )
             less = found.with_cost(less)
             if less.score - current.score < price(candidate) and (weakest is None or less.score < weakest.score):
@@ -161,7 +162,7 @@ def _rivals(found: Search, candidate: CandidateEffect) -> list[Rival]:
         refitting(f"refitting in place of {candidate.id}", other.id, len(seen), most)
         seen.add(other.id)
         start = from_here(screened, final).start
-        fitted = continuous_fit(final.fit, rest.plus(other), found.own, final.fit.noise, start, bars=_in_reach(final))
+        fitted = continuous_fit(final.fit, rest.plus(other), found.own, final.fit.noise, start, bars=in_reach(final))
         fitted = found.with_cost(fitted)
         rivals.append(Rival(other, fitted.worse_than(final), fitted))
     return rivals

@@ -10,13 +10,12 @@ from dataclasses import replace
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.effects.setup import TimeOffset
-from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, begun_later, price_of_places, recounted
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, begun_later, recounted, uncounted
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.exchange import in_reach
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
-from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
 
 __all__ = ["with_losses_recounted"]
 
@@ -25,7 +24,7 @@ _LOST = {sensor: catalogued(DroppedSamples, sensor).id for sensor in ("magnetome
 #: most rounds in which counts of lost samples and the motion better one another
 _RECOUNTS = 6
 #: fewest losses for which a slow clock may stand
-_FEWEST_EVEN = 4
+_FEWEST = 4
 
 
 def with_losses_recounted(found: Search, current: ContinuousFit) -> tuple[Search, ContinuousFit]:
@@ -79,35 +78,25 @@ def _by_a_slow_clock(found: Search, current: ContinuousFit, sensor: str) -> tupl
     Between corners nothing tells where samples were lost, so that losses of a clock's need not look even.
     """
     clock = next((c for c in found.candidates if (c.row.type, c.row.acts_on) == (ClockRate, sensor)), None)
-    counts = [one.lost[sensor] for one in current.fit.trajectories if sensor in one.lost]
-    lost, read = sum(float(one[-1]) for one in counts), sum(one.size for one in counts)
-    if clock is None or clock in current.hypothesis.candidates or lost < _FEWEST_EVEN:
+    lost = sum(float(one.lost[sensor][-1]) for one in current.fit.trajectories if sensor in one.lost)
+    if clock is None or clock in current.hypothesis.candidates or lost < _FEWEST:
         return found, current
-    share = lost / read
     losses = next(one for one in current.hypothesis.candidates if one.id == _LOST[sensor])
-    start = {**values_of_fit(current), ((clock.id, "ratio"), None): 1.0 / (1.0 + share)}
+    ((_, fraction, _),) = losses.fixed_values
+    without, cheaper = uncounted(current.fit, sensor)
     fitted = continuous_fit(
-        _without_losses(current.fit, sensor),
+        without,
         current.hypothesis.without(losses).plus(clock),
         found.own,
         current.fit.noise,
-        start,
-        bars=Bars(merit_of(current.fit, current.fit.linears) + SELECTION.out_of_reach),
+        {**values_of_fit(current), ((clock.id, "ratio"), None): 1.0 - fraction},
+        bars=in_reach(current),
     )
-    cheaper = price_of_places(lost, lost / (read + lost))
     fitted = found.with_cost(fitted, -cheaper)
     if not fitted.score + price(clock) < current.score + price(losses):
         return found, current
-    return replace(found, relaxed_fit=_without_losses(found.relaxed_fit, sensor), cost=found.cost - cheaper), fitted
-
-
-def _without_losses(fit: Fit, sensor: str) -> Fit:
-    """Return a fit whose trajectories hold no losses of a sensor."""
-    trajectories = tuple(
-        replace(one, lost={other: counts for other, counts in one.lost.items() if other != sensor})
-        for one in fit.trajectories
-    )
-    return replace(fit, trajectories=trajectories)
+    relaxed_fit, _ = uncounted(found.relaxed_fit, sensor)
+    return replace(found, relaxed_fit=relaxed_fit, cost=found.cost - cheaper), fitted
 
 
 def _fitted(
