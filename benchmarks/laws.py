@@ -29,15 +29,10 @@ from discsim.threads import limited
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE, OffCatalogue
-from discsim.validation.diagnosis.relaxed_fit import relaxed
-from discsim.validation.diagnosis.relaxed_fit.outliers import without_outliers
-from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.result import Law
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.unknown_law.find import find_law
-from discsim.validation.identification.noise import estimate_noise
-from discsim.validation.identification.stated_parameters import stated_parameters
 
 #: field of a kind that is a shape of a law, and the coefficient's name there (a second term's has a 2 behind)
 SHAPES = {
@@ -82,12 +77,7 @@ def asked(seed: int, kind: str | None) -> tuple[str, Row]:
     made = recordings(case)
     begun = time.process_time()
     with limited():
-        stated = stated_parameters(made)
-        own = (*stated, *unknowns(made))
-        relaxed_fit, _ = without_outliers(relaxed(made, stated))
-        noise = estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
-        base = continuous_fit(relaxed_fit, Hypothesis(), own, noise, {}, iterations=relaxed_fit.plant.base_steps)
-        law = find_law(relaxed_fit, base, own, noise, made)
+        law = find_law(screened(SearchProblem(made)))
     error = shape_error(name, case.secret, law.law) if law is not None else None
     off = "" if error is None else f", shape off by {error:+.1f} sd"
     said = "no law" if law is None else f"{told(law.law)}, share {law.share:.3f}{off}"
