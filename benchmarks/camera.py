@@ -18,6 +18,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # a file beside this one is called estimators too
 
@@ -63,8 +64,8 @@ def in_plan(recording: Recording, release: Release, rng: np.random.Generator) ->
     position, velocity, C_NB, rate = release.start()
     roll, pitch, _ = (float(angle[0]) for angle in euler_angles(quaternion_from_matrix(C_NB)[None]))
 
-    def read_off(key: str, true: object) -> FloatArray:
-        return np.asarray(true + np.asarray(READ_OFF[key]) * rng.standard_normal(np.shape(true)))
+    def read_off(key: str, true: ArrayLike) -> FloatArray:
+        return np.asarray(true) + np.asarray(READ_OFF[key]) * rng.standard_normal(np.shape(true))
 
     stated = Release(
         position=read_off("position_ned_m", position),

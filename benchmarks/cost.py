@@ -24,6 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import scipy.fft
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
@@ -55,7 +56,7 @@ def least(work: Callable[[], object], repetitions: int) -> float:
     return min(spent)
 
 
-def whole_transforms(x: FloatArray, total: int, first: int) -> FloatArray:
+def whole_transforms(x: FloatArray, total: int, first: int) -> NDArray[np.int64]:
     """Return the orders of the peaks by (P-2) to (P-5) as written, 256 windows at once."""
     orders = np.empty(len(x), dtype=np.int64)
     for start in range(0, len(x), 256):

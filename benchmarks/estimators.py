@@ -9,6 +9,7 @@ on two cores, ``--quick`` one. Data come from closed-form motion (tests/support/
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import platform
 import sys
@@ -183,11 +184,11 @@ def main() -> None:
     command += "" if any(word.startswith("--seed") for word in sys.argv[1:]) else f" --seed {options.seed}"
     start = time.perf_counter()
     if options.quick:
-        runs, count, windows, levels, cases = 8, 12, (0.5, 1.0), (20.0, 40.0), ("steady", EVERYTHING)
+        combinations = itertools.product(("steady", EVERYTHING), (0.5, 1.0), (20.0, 40.0), RATES)
     else:
-        runs, count, windows, levels, cases = 10, 40, WINDOWS, DECIBELS, tuple(CASES)
-    runs, count = options.runs or runs, options.throws or count
-    kinds = [Kind(w, level, rate, case) for case in cases for w in windows for level in levels for rate in RATES]
+        combinations = itertools.product(CASES, WINDOWS, DECIBELS, RATES)
+    runs, count = options.runs or (8 if options.quick else 10), options.throws or (12 if options.quick else 40)
+    kinds = [Kind(window, level, rate, case) for case, window, level, rate in combinations]
     cost = cost_table()  # alone, before the cores are busy
     with ProcessPoolExecutor(options.jobs) as pool:
         # the longest first, so that no core is idle at the end

@@ -14,6 +14,7 @@ import re
 import subprocess
 import sys
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
 from time import perf_counter
 
 #: distributions that pip brings itself
@@ -23,7 +24,7 @@ LIMIT_S = 0.3
 
 def size_mb(found: Distribution) -> float:
     """Return the size of all files of a distribution, MB."""
-    paths = [found.locate_file(file) for file in found.files or ()]
+    paths = [Path(str(found.locate_file(file))) for file in found.files or ()]
     return sum(path.stat().st_size for path in paths if path.is_file()) / 1e6
 
 

@@ -75,8 +75,8 @@ def only(recording: Recording, sensors: tuple[str, ...]) -> Recording:
 def table(throws: int) -> list[str]:
     """Return the lines of the table."""
     rng = np.random.default_rng(12)
-    errors: list[list[np.ndarray]] = [[] for _ in ROWS]  # type: ignore[type-arg]
-    scaled: list[list[np.ndarray]] = [[] for _ in ROWS]  # type: ignore[type-arg]
+    errors: list[list[np.ndarray]] = [[] for _ in ROWS]
+    scaled: list[list[np.ndarray]] = [[] for _ in ROWS]
     shares: list[list[float]] = [[] for _ in ROWS]
     for number in range(throws):
         spin, faults = random_throw(rng)

@@ -141,11 +141,15 @@ def alone(count: int, cores: int) -> float:
         "fly_many(DISC, ENVIRONMENT, some, threads=1); print(process_time() - start)"
     )
     words = [sys.executable, "-c", code, str(Path(__file__).parent), str(count)]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    processes = [subprocess.Popen([*words, str(k), str(cores)], **pipes) for k in range(cores)]
+    processes = [
+        subprocess.Popen([*words, str(k), str(cores)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        for k in range(cores)
+    ]
     for process in processes:
+        assert process.stdout is not None
         process.stdout.readline()
     for process in processes:
+        assert process.stdin is not None
         process.stdin.write("\n")
         process.stdin.flush()
     return max(float(process.communicate()[0]) for process in processes)

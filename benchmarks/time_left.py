@@ -38,7 +38,7 @@ def told(plant: str, events: list[tuple[float, str, int, int]], whole: float) ->
     found: list[float | None] = []
     for part in PARTS:
         clock = iter([0.0, *(at for at, *_ in events)])
-        left, last = TimeLeft(table=plant == "rate_table", now=lambda clock=clock: next(clock)), None
+        left, last = TimeLeft(table=plant == "rate_table", now=clock.__next__), None
         for at, stage, done, total in events:
             if at > part * whole:
                 break

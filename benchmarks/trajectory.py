@@ -14,7 +14,7 @@ import os
 import statistics
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter, process_time, thread_time
 
 import numpy as np
@@ -91,7 +91,7 @@ def against_frispy(python: str, rounds: int) -> None:
         print(f"FrisPy: not installed in {python}, this part is skipped; pip install frispy, or name its interpreter")
         return
 
-    def ask(options: dict[str, object]) -> tuple[float, float]:
+    def ask(options: Mapping[str, object]) -> tuple[float, float]:
         assert process.stdin is not None
         assert process.stdout is not None
         process.stdin.write(f"{options}\n")
