@@ -22,6 +22,7 @@ from discsim.validation.diagnosis.detectors.sample_alignment import (
     lost_in_own_noise,
     phase_counts,
     repaired,
+    told_of,
 )
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
@@ -79,22 +80,31 @@ def price_of_places(lost: float, share: float) -> float:
     return float(2.0 * lost * (1.0 - np.log(share)))
 
 
-def _losses(id: str, trajectories: Sequence[Trajectory], sensor: str) -> tuple[CandidateEffect, float]:
-    """Return the candidate of lost samples as trajectories hold them, and the price of where they are."""
-    lost = sampled = 0.0
-    cost = 0.0
-    for trajectory in trajectories:
+def _losses(fit: Fit, sensor: str) -> tuple[CandidateEffect, float]:
+    """Return the candidate of a sensor's lost samples as a fit holds them, and the price of where they are.
+
+    Samples in which one more loss would not have shown are none of those whose share was lost.
+    """
+    sd = _stated_sd(fit, sensor, fit.noise)
+
+    def one(i: int) -> tuple[float, float]:
+        trajectory = fit.trajectories[i]
         counts = trajectory.lost.get(sensor)
+        readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
         if counts is None:
-            continue
-        n, gone = float(counts.size), float(counts[-1])
-        lost, sampled = lost + gone, sampled + n + gone
+            return 0.0, 0.0
+        if readings is None or readings.t.size != counts.size:
+            return float(counts[-1]), float(counts.size + counts[-1])
+        own = alignment_of(trajectory, fit.values(i), readings, trajectory.recording.sheets[sensor].rate_hz)
+        told = max(told_of(own, counts.astype(np.int64), sd), int(np.searchsorted(counts, counts[-1])))
+        return float(counts[-1]), float(told + counts[-1])
+
+    lost, sampled = np.sum(mapped(one, range(len(fit.trajectories))), axis=0)
     sampled = max(sampled, 1.0)
-    share = lost / sampled
-    if lost:
-        cost = price_of_places(lost, share)
-    sd = float(np.sqrt(max(share * (1.0 - share), 1.0 / sampled) / sampled))
-    return CandidateEffect(id, (), None, (("fraction", share, sd),)), cost
+    share = float(lost / sampled)
+    sd_of_share = float(np.sqrt(max(share * (1.0 - share), 1.0 / sampled) / sampled))
+    cost = price_of_places(float(lost), share) if lost else 0.0
+    return CandidateEffect(_id_of(sensor), (), None, (("fraction", share, sd_of_share),)), cost
 
 
 @dataclass(frozen=True)
@@ -128,7 +138,6 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
     """
     trajectories = fit.trajectories
     sensor = "magnetometer"
-    id = _id_of(sensor)
     counts = [
         phase_counts(trajectory.recording) if trajectory.recording.get(sensor) is not None else np.zeros(0)
         for trajectory in trajectories
@@ -168,7 +177,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
         found = _with_losses(fitted, counted, sensor)
         if same:
             break
-    candidate, cost = _losses(id, found.trajectories, sensor)
+    candidate, cost = _losses(found, sensor)
     return [Shifted(ScreenedCandidate(candidate, gain - cost, {}), found, cost)]
 
 
@@ -220,7 +229,6 @@ _FEWEST = 40
 def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.least_dropped) -> list[Shifted]:
     """Return lost samples of the accelerometer as a screened candidate where the motion tells of them."""
     sensor = "accelerometer"
-    id = _id_of(sensor)
     if sensor not in {r.sensor for trajectory in fit.trajectories for r in trajectory.readings}:
         return []
     if sensor not in noise:  # all of its readings are beyond its range, and none takes part
@@ -252,7 +260,7 @@ def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.
             break
         level = lower
         again = refit(replace(whole, noise={**noise, sensor: noise[sensor]._replace(sd=level)}), iterations=3)
-    candidate, cost = _losses(id, whole.trajectories, sensor)
+    candidate, cost = _losses(whole, sensor)
     if candidate.fixed_values[0][1] == 0.0:
         return []
     return [Shifted(ScreenedCandidate(candidate, gain, {}), whole, cost)]
@@ -289,7 +297,7 @@ def begun_later(fit: Fit, sensor: str, recording: int, count: int) -> tuple[Shif
 
 def uncounted(fit: Fit, sensor: str) -> tuple[Fit, float]:
     """Return a fit whose trajectories hold no losses of a sensor, and what theirs had cost."""
-    _, cost = _losses(_id_of(sensor), fit.trajectories, sensor)
+    _, cost = _losses(fit, sensor)
     trajectories = tuple(
         replace(one, lost={other: counts for other, counts in one.lost.items() if other != sensor})
         for one in fit.trajectories
@@ -299,8 +307,8 @@ def uncounted(fit: Fit, sensor: str) -> tuple[Fit, float]:
 
 def _shifted(before: Fit, after: Fit, sensor: str, gain: float) -> tuple[Shifted, float]:
     """Return the losses of a fit as a candidate, with a gain, and how much dearer than those of one before they are."""
-    _, was = _losses(_id_of(sensor), before.trajectories, sensor)
-    candidate, cost = _losses(_id_of(sensor), after.trajectories, sensor)
+    _, was = _losses(before, sensor)
+    candidate, cost = _losses(after, sensor)
     return Shifted(ScreenedCandidate(candidate, gain, {}), after, cost), cost - was
 
 

@@ -28,6 +28,7 @@ __all__ = [
     "lost_in_own_noise",
     "phase_counts",
     "repaired",
+    "told_of",
     "viterbi_counts",
 ]
 
@@ -284,6 +285,20 @@ def lost_along(own: Alignment, sd: FloatArray) -> Losses:
     plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
     path, gain = _likeliest(own, plain, _MARGIN * sd)
     return Losses(path.astype(float), gain, sd)
+
+
+def told_of(own: Alignment, counts: IntArray, sd: FloatArray) -> int:
+    """Return how many of the first samples are such that one more loss before each would show, at counts (n,).
+
+    It shows where it speaks for itself by more than a loss costs, in a noise of the axes ``sd`` (k,). Where a rate is
+    held to the end nothing tells of what was lost meanwhile.
+    """
+    plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    cost = own.price(plain, _MARGIN * sd)
+    k = np.arange(counts.size)
+    one_more = cost[k, np.minimum(counts + 1, own.most)] - cost[k, np.minimum(counts, own.most)]
+    shows = np.flatnonzero((np.cumsum(one_more[::-1])[::-1] > _COST) | (counts >= own.most))
+    return int(shows[-1]) + 1 if shows.size else 0
 
 
 def lost_and_turned(own: Alignment, sd: FloatArray) -> tuple[Losses, float]:

@@ -35,6 +35,7 @@ from discsim.validation.diagnosis.detectors.sample_alignment import (
     lost_and_turned,
     lost_in_own_noise,
     phase_counts,
+    told_of,
     viterbi_counts,
 )
 from discsim.validation.diagnosis.detectors.saturation import saturation
@@ -193,6 +194,33 @@ def test_lost_samples_of_the_accelerometer_are_counted_by_the_motion_of_the_othe
     ((name, share, sd),) = found.screened.candidate.fixed_values
     assert name == "fraction"
     assert share == pytest.approx(0.02, abs=4.0 * sd)
+
+
+def test_what_is_lost_while_a_rate_is_held_to_the_end_is_not_told() -> None:
+    rng = np.random.default_rng(8)
+    course = np.column_stack([np.minimum(np.arange(1008) * 0.02, 10.0), np.full(1008, 9.8)])
+    own = Alignment(course[:1000] + 0.1 * rng.standard_normal((1000, 2)), course, np.arange(1000), 7, range(0))
+    counts, sd = np.zeros(1000, dtype=np.int64), np.full(2, 0.1)
+    # it takes so many samples of the slope for one more loss to say more than its price against it
+    assert told_of(own, counts, sd) == pytest.approx(500, abs=2.0 * np.log(100.0) / (0.02 / 0.2) ** 2)
+    assert told_of(own, counts, sd) < 500
+    held = replace(own, shown=np.full_like(course, 9.8))
+    assert told_of(held, counts, sd) == 0
+    # more cannot have been lost than there is room for
+    assert told_of(replace(own, most=0), counts, sd) == 1000
+
+
+def test_the_share_of_lost_samples_is_of_those_among_which_a_loss_would_show() -> None:
+    held = Samples(np.array([0.0, 1.0, 2.0, 6.0]), np.array([12.0, 12.0, 35.0, 35.0]))
+    lost = Instruments.from_parts("mpu9250").with_effects([effect("accel.dropped_samples", fraction=0.03)])
+    motion = turn_table(held, FIELD)
+    fit = relaxed([record(motion, lost, np.random.default_rng(5), plant="rate_table", name="table", command=held)])
+    (found,) = dropped_accelerometer(fit, shown_noise(fit))
+    [(_, share, sd)] = found.screened.candidate.fixed_values
+    counted = float(found.trajectories[0].lost["accelerometer"][-1])
+    # of what was lost after the last one found nothing tells
+    assert counted / share < len(fit.trajectories[0].recording.samples["accelerometer"])
+    assert abs(share - 0.03) < 3.0 * sd
 
 
 @pytest.mark.slow
