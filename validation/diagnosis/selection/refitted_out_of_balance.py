@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import unbalanced
 from discsim.validation.diagnosis.relaxed_fit.sensor_residuals import left_across
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 
@@ -26,4 +27,19 @@ def refitted_out_of_balance(found: Search) -> Search:
     start = replace(fit, trajectories=unbalanced(fit))
     final = continuous_fit(start, found.final.hypothesis, found.own, fit.noise, values_of_fit(found.final))
     nearer = left_across(replace(final.fit, noise=fit.noise)) < RELAXED_FIT.unbalanced * left_across(fit)
-    return replace(found, final=final) if nearer else found
+    return replace(found, final=_without_what_stood_for_it(found, final)) if nearer else found
+
+
+def _without_what_stood_for_it(found: Search, final: ContinuousFit) -> ContinuousFit:
+    """Return a fit of bodies out of balance less the effects on the motion that are not worth their price any more.
+
+    Before the body's own moments were free, an asymmetry of its inertia stood for some of what they do.
+    """
+    for candidate in final.hypothesis.candidates:
+        if candidate.row.acts_on != "motion" or candidate.fixed_values:
+            continue
+        rest = final.hypothesis.without(candidate)
+        less = continuous_fit(final.fit, rest, found.own, final.fit.noise, values_of_fit(final))
+        if less.worse_than(final) < price(candidate):
+            final = less
+    return final
