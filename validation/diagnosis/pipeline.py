@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from discsim.effects.own import UserEffect
 from discsim.effects.sensors import DroppedSamples
-from discsim.effects.setup import TimeOffset
+from discsim.effects.setup import Axes, BoardRotation, TimeOffset
 from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
@@ -38,7 +39,7 @@ from discsim.validation.diagnosis.setup_effects import (
     free_parameters,
     with_reversed_axes,
     with_those_borne_out,
-    without_offsets,
+    without_faults,
 )
 from discsim.validation.diagnosis.stages import Prepared, Question, Tried
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw, LawOfAll, find_law
@@ -256,7 +257,20 @@ def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
     late = {fault.effect.row.acts_on for fault in tried.prepared.setup.faults if fault.effect.row.type is TimeOffset}
     named = [candidate.row for candidate in tried.found.final.hypothesis.candidates]
     losing = any(row.type is DroppedSamples and row.acts_on in late for row in named)
-    return without_offsets(tried.prepared.setup, question.recordings) if losing or not _explains(tried) else None
+    return _without(tried, question, TimeOffset) if losing or not _explains(tried) else None
+
+
+def axes_as_written(tried: Tried, question: Question) -> SetupFindings | None:
+    """Suppose that no board and no axes are turned, where turned ones leave more than noise.
+
+    By a strong magnet beside it the field turns over along a low path, as if the board lay upside down.
+    """
+    return None if _explains(tried) else _without(tried, question, BoardRotation, Axes)
+
+
+def _without(tried: Tried, question: Question, *types: type[Any]) -> SetupFindings | None:
+    """Return the setup of what was tried without its faults of some types; None if there are no such."""
+    return without_faults(tried.prepared.setup, question.recordings, *types)
 
 
 def reversed_axes(tried: Tried, question: Question) -> SetupFindings | None:
@@ -274,6 +288,7 @@ def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
 _SUPPOSITIONS = (
     (likeliest_fault, _follows),
     (times_as_written, _explains),
+    (axes_as_written, _explains),
     (reversed_axes, _follows),
     (borne_out, _follows),
 )

@@ -42,7 +42,7 @@ __all__ = [
     "on_board_axes",
     "with_reversed_axes",
     "with_those_borne_out",
-    "without_offsets",
+    "without_faults",
 ]
 
 #: how far a number of a fault may be from its first value, one sigma: s; rad; rad and share. Offsets are found to a few
@@ -94,14 +94,15 @@ def with_those_borne_out(findings: SetupFindings, written: Sequence[Recording], 
     return _with_only([fault for fault in findings.faults if _borne_out(fault.effect, fit)], findings, written)
 
 
-def without_offsets(findings: SetupFindings, written: Sequence[Recording]) -> SetupFindings | None:
-    """Return findings without the times that were taken to be off; None if there are no such.
+def without_faults(findings: SetupFindings, written: Sequence[Recording], *types: type[Any]) -> SetupFindings | None:
+    """Return findings without the faults of some types of effect; None if there are no such.
 
-    Relations between sensors take samples that were lost, or a clock that steps, for times that are off.
+    Relations between sensors take samples that were lost, or a clock that steps, for times that are off, and a magnet
+    by which the field turns over along a path for a board that is turned. ``written`` are the recordings as they stand
+    in their files.
     """
-    return _with_only(
-        [fault for fault in findings.faults if fault.effect.row.type is not TimeOffset], findings, written
-    )
+    kept = [fault for fault in findings.faults if fault.effect.row.type not in types]
+    return _with_only(kept, findings, written)
 
 
 def _with_only(

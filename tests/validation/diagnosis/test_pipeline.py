@@ -62,6 +62,14 @@ def test_times_that_relations_take_to_be_off_are_so_only_where_they_explain_more
     assert [named.id for named in diagnosis.effects] == [error.id]
 
 
+def test_a_board_is_turned_only_where_that_leaves_no_more_than_noise(monkeypatch):
+    made, fault = tables(), effect("board.rotation", rx_rad=np.pi, ry_rad=0.0, rz_rad=0.0)
+    taken = SetupFindings((SetupFault(fault, 60.0, None),), tuple(corrected(one, [fault]) for one in made))
+    monkeypatch.setattr(pipeline, "find_setup_faults", lambda _: taken)
+    diagnosis = pipeline.diagnose([made], ["tables"]).diagnosis
+    assert (diagnosis.verdict, diagnosis.effects) == ("consistent", ())
+
+
 def mains_beside_a_rig(frequencies: Sequence[float]) -> list[Recording]:
     """Return run-downs beside a cable whose field is half of the earth's, at a frequency in each."""
     made = []
