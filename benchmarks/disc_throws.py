@@ -18,6 +18,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # a file beside this one is called estimators too
 
 from discsim.recording import read_recording
+from discsim.threads import limited
 from discsim.validation.diagnosis.pipeline import diagnose
 
 
@@ -31,7 +32,8 @@ def main(files: list[str]) -> None:
             subprocess.run([sys.executable, "-m", "discsim.validation.cli", *words], check=True, capture_output=True)
         recordings = [read_recording(path) for path in made]
     start = time.process_time()
-    found = diagnose([recordings], ["throws"]).diagnosis
+    with limited():
+        found = diagnose([recordings], ["throws"]).diagnosis
     print(
         f"{found.verdict}: {', '.join(effect.id for effect in found.effects)}; {time.process_time() - start:.0f} CPU-s"
     )
