@@ -14,6 +14,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
 from discsim.validation.diagnosis.detectors.sample_alignment import (
+    Alignment,
     Losses,
     alignment_of,
     first_yaw,
@@ -80,6 +81,15 @@ def price_of_places(lost: float, share: float) -> float:
     return float(2.0 * lost * (1.0 - np.log(share)))
 
 
+def _alignment(fit: Fit, i: int, sensor: str) -> Alignment | None:
+    """Return a sensor's readings in a recording beside what a fit's motion shows of it; None where it has none."""
+    trajectory = fit.trajectories[i]
+    readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
+    if readings is None:
+        return None
+    return alignment_of(trajectory, fit.values(i), readings, trajectory.recording.sheets[sensor].rate_hz)
+
+
 def _losses(fit: Fit, sensor: str) -> tuple[CandidateEffect, float]:
     """Return the candidate of a sensor's lost samples as a fit holds them, and the price of where they are.
 
@@ -90,12 +100,11 @@ def _losses(fit: Fit, sensor: str) -> tuple[CandidateEffect, float]:
     def one(i: int) -> tuple[float, float]:
         trajectory = fit.trajectories[i]
         counts = trajectory.lost.get(sensor)
-        readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
         if counts is None:
             return 0.0, 0.0
-        if readings is None or readings.t.size != counts.size:
+        own = _alignment(fit, i, sensor)
+        if own is None or len(own.measured) != counts.size:
             return float(counts[-1]), float(counts.size + counts[-1])
-        own = alignment_of(trajectory, fit.values(i), readings, trajectory.recording.sheets[sensor].rate_hz)
         told = max(told_of(own, counts.astype(np.int64), sd), int(np.searchsorted(counts, counts[-1])))
         return float(counts[-1]), float(told + counts[-1])
 
@@ -321,10 +330,9 @@ def _counted_in_own_noise(fit: Fit, sensor: str, noise: NoiseModel) -> tuple[Fit
 
     def one(i: int) -> tuple[Trajectory, Losses | None]:
         trajectory = fit.trajectories[i]
-        readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
-        if readings is None:
+        own = _alignment(fit, i, sensor)
+        if own is None:
             return trajectory, None
-        own = alignment_of(trajectory, fit.values(i), readings, trajectory.recording.sheets[sensor].rate_hz)
         losses = lost_in_own_noise(own, stated, np.full_like(stated, noise[sensor].sd))
         return replace(trajectory, lost={**trajectory.lost, sensor: losses.counts}), losses
 
@@ -360,10 +368,9 @@ def _counted(fit: Fit, sensor: str, sd: FloatArray) -> Fit:
 
     def one(i: int) -> Trajectory:
         trajectory = fit.trajectories[i]
-        readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
-        if readings is None:
+        own = _alignment(fit, i, sensor)
+        if own is None:
             return trajectory
-        own = alignment_of(trajectory, fit.values(i), readings, trajectory.recording.sheets[sensor].rate_hz)
         losses, turn = (lost_along(own, sd), 0.0) if yaw is None else lost_and_turned(own, sd)
         states = trajectory.states.copy()
         if yaw is not None:

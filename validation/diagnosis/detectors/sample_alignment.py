@@ -263,6 +263,11 @@ def _stopped(recording: Recording, sensor: str, end: float) -> float:
     return max(min(others, default=end), end)
 
 
+def _as_it_is(sd: FloatArray) -> FloatArray:
+    """Return the line (2, k) that leaves a motion as it is: a factor of one and no offset for each axis of ``sd``."""
+    return np.stack([np.ones_like(sd), np.zeros_like(sd)])
+
+
 def _likeliest(own: Alignment, line: FloatArray, sd: FloatArray) -> tuple[IntArray, float]:
     """Return the likeliest counts (n,) in a noise (k,), and their gain over none, as the readings alone tell it."""
     cost = own.price(line, sd)
@@ -282,7 +287,7 @@ def _likeliest(own: Alignment, line: FloatArray, sd: FloatArray) -> tuple[IntArr
 
 def lost_along(own: Alignment, sd: FloatArray) -> Losses:
     """Return the likeliest losses of a sensor by a motion as it is, in a noise of its axes, ``sd`` (k,)."""
-    plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    plain = _as_it_is(sd)
     path, gain = _likeliest(own, plain, _MARGIN * sd)
     return Losses(path.astype(float), gain, sd)
 
@@ -293,7 +298,7 @@ def told_of(own: Alignment, counts: IntArray, sd: FloatArray) -> int:
     It shows where it speaks for itself by more than a loss costs, in a noise of the axes ``sd`` (k,). Where a rate is
     held to the end nothing tells of what was lost meanwhile.
     """
-    plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    plain = _as_it_is(sd)
     cost = own.price(plain, _MARGIN * sd)
     k = np.arange(counts.size)
     one_more = cost[k, np.minimum(counts + 1, own.most)] - cost[k, np.minimum(counts, own.most)]
@@ -307,7 +312,7 @@ def lost_and_turned(own: Alignment, sd: FloatArray) -> tuple[Losses, float]:
     Nothing but the magnetometer tells a rig's yaw. Where a loss was overlooked, a fit turns all by half of its step,
     and by that motion it would be overlooked again.
     """
-    plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    plain = _as_it_is(sd)
     z = own.shown[:, 0] + 1j * own.shown[:, 1]
     step = float(np.median(np.angle(z[1:] * np.conj(z[:-1]))))
     best: tuple[float, Losses, float] | None = None
@@ -356,7 +361,7 @@ def _first_lines(own: Alignment, sd: FloatArray) -> list[FloatArray]:
     About none lost the factor of an axis that turns with the disc would vanish where samples slip, so it is one. What
     dies away slips to one side, and that median is no offset then. Within the noise ``sd`` (k,) both are one.
     """
-    itself = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    itself = _as_it_is(sd)
     left = own.left(np.zeros(len(own.measured), dtype=np.int64), itself)
     median = np.array([np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in left.T])
     beside = np.stack([itself[0], median])

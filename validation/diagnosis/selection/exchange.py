@@ -6,6 +6,7 @@ recordings instead of one, or gives way to a better rival. Each refit starts fro
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
@@ -71,12 +72,12 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
     return final
 
 
-def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEffect | None = None) -> ContinuousFit:
-    """Return a fit less the effects that the others have made superfluous, but for one that is ``kept``."""
+def eliminated_backward(found: Search, current: ContinuousFit, kept: Collection[CandidateEffect] = ()) -> ContinuousFit:
+    """Return a fit less the effects that the others have made superfluous, but for those that are ``kept``."""
     while len(current.hypothesis.candidates) > 1:
         weakest: ContinuousFit | None = None
         for number, candidate in enumerate(current.hypothesis.candidates):
-            if _in_trajectories(candidate) or candidate is kept:
+            if _in_trajectories(candidate) or candidate in kept:
                 continue
             refitting("refitting without", candidate.id, number, len(current.hypothesis.candidates))
             less = continuous_fit(
@@ -225,7 +226,7 @@ def exchanged(found: Search) -> ContinuousFit | None:
             if takes_its_place(rival.worse, rival, candidate, found.final):
                 better.append((_merit(rival.worse, rival, candidate, found.final), rival.fitted))
             elif size > 1 and rival.worse < SELECTION.better:
-                fewer = eliminated_backward(found, rival.fitted, kept=rival.candidate)
+                fewer = eliminated_backward(found, rival.fitted, kept=[rival.candidate])
                 merit = fewer.worse_than(found.final) + SELECTION.rival * (fewer.hypothesis.size - size)
                 if (
                     len(fewer.hypothesis.candidates) < len(found.final.hypothesis.candidates)

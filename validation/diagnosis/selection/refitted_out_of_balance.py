@@ -7,7 +7,7 @@ from dataclasses import replace
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import unbalanced
 from discsim.validation.diagnosis.relaxed_fit.sensor_residuals import left_across
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.exchange import eliminated_backward
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 
@@ -25,7 +25,9 @@ def refitted_out_of_balance(found: Search) -> Search:
     if fit.plant.unbalanced is None or not found.final.hypothesis.candidates:
         return found
     start = replace(fit, trajectories=unbalanced(fit))
-    final = continuous_fit(start, found.final.hypothesis, found.own, fit.noise, values_of_fit(found.final))
+    final = found.with_cost(
+        continuous_fit(start, found.final.hypothesis, found.own, fit.noise, values_of_fit(found.final))
+    )
     nearer = left_across(replace(final.fit, noise=fit.noise)) < RELAXED_FIT.unbalanced * left_across(fit)
     return replace(found, final=_without_what_stood_for_it(found, final)) if nearer else found
 
@@ -35,11 +37,5 @@ def _without_what_stood_for_it(found: Search, final: ContinuousFit) -> Continuou
 
     Before the body's own moments were free, an asymmetry of its inertia stood for some of what they do.
     """
-    for candidate in final.hypothesis.candidates:
-        if candidate.row.acts_on != "motion" or candidate.fixed_values:
-            continue
-        rest = final.hypothesis.without(candidate)
-        less = continuous_fit(final.fit, rest, found.own, final.fit.noise, values_of_fit(final))
-        if less.worse_than(final) < price(candidate):
-            final = less
-    return final
+    of_sensors = [candidate for candidate in final.hypothesis.candidates if candidate.row.acts_on != "motion"]
+    return eliminated_backward(found, final, kept=of_sensors)

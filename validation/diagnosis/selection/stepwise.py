@@ -161,7 +161,7 @@ def _selected_forward(found: Search, of_use: int | None, law: Callable[[Search],
             found, next_one = _in_stated_noise(found, better, step + 1)
             if next_one is None or past_hope(found, better, next_one, further - 1):
                 return replace(found, final=better)
-        found = _with_final(found, eliminated_backward(found, better, kept=better.hypothesis.candidates[-1]))
+        found = _with_final(found, eliminated_backward(found, better, kept=better.hypothesis.candidates[-1:]))
     return found
 
 
