@@ -329,14 +329,15 @@ def _iterated(
     """
     damping = np.full(len(fit.trajectories), first)
     closed: Fit | None = None
-    settled, refused, stuck, hops = False, False, 0, 0
+    settled, refused, stuck, hops, idle = False, False, 0, 0, 0
     for done in range(iterations):
         reduced, (step, covariance, expected) = _solved(fit, damping)
         fit = replace(fit, covariance=covariance)
         if done >= _LOOKED and expected > bar:
             return fit, False
-        closed = _better_continuous(closed, fit)
         least = max(tolerance, 1e-7 * fit.merit)
+        known, closed = closed, _better_continuous(closed, fit)
+        idle = idle + 1 if known is not None and closed is not None and known.merit - closed.merit < least else 0
         if fit.merit - expected < least and not discontinuous(fit):
             return fit, False
         going = GaussNewtonStep(fit, reduced, step, bounds, expected)
@@ -344,19 +345,26 @@ def _iterated(
             better, rose = going.with_own_fractions()
             damping = np.where(rose, np.clip(_TIGHTER * damping, _LEAST_DAMPING, _MOST_DAMPING), _LOOSER * damping)
             stuck = stuck + 1 if better is None else 0
-            better = better or going.with_one_fraction()
+            better = better or _lower(fit, going.with_one_fraction())
+            if better is None and stuck < _STUCK and idle < _IDLE:
+                continue  # held harder, from where it stands
         else:
             better = going.with_one_fraction()
             hops = hops + 1 if better is not None and _hopped(fit, better) else 0
         refused = better is None and fit.merit - expected > CHORD
         settled = better is None or (not discontinuous(fit) and fit.merit - better.merit < least)
         fit = better or fit
-        if settled or stuck == _STUCK or hops == _HOPS:
+        if settled or stuck == _STUCK or hops == _HOPS or (first > _FREE and idle >= _IDLE):
             break
     apart = discontinuous(fit)
     if closed is not None and (apart or closed.merit < fit.merit):
         fit = closed
     return fit, refused or (apart and not settled)
+
+
+def _lower(fit: Fit, found: Fit | None) -> Fit | None:
+    """Return what a step has found where its merit is lower; None where it is not."""
+    return found if found is not None and found.merit < fit.merit else None
 
 
 def _hopped(fit: Fit, better: Fit) -> bool:
@@ -380,6 +388,8 @@ _HELD = 3
 _NO_NEARER, _HOPS = 0.98, 2
 #: so many held steps in turn of which no share served every recording lead nowhere
 _STUCK = 4
+#: so many held steps after the best end whose segments are continuous bring none that is better: they go round it
+_IDLE = 8
 #: tries at a step, and what a step that leads astray is shortened by
 _TRIES, _SHORTER = 5, 0.4
 #: a recording whose chi-squared per reading is above this is far from its data
@@ -389,8 +399,9 @@ _RISE = 1.3
 #: a step that is expected to gain less than this, three standard deviations in all, keeps the slopes that it was worked
 #: out with, unless it misses what was expected by more than this share of it
 CHORD, _CHORD_MISSES = 10.0, 0.1
-#: a rise by more than this is a step that went too far
-_ROSE = 1.02
+#: a rise by more than this is a step that went too far: a fiftieth of the scatter of chi-squared of 3000 readings.
+#: Where steps may rise by a share of that they end in turns, from one side of a valley to the other and back
+_ROSE = 1.0005
 
 
 @dataclass(frozen=True)

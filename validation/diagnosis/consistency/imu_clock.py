@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
+from discsim.compiled import compiled
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.consistency.late_rows import (
     MISCOUNTED,
@@ -240,19 +241,27 @@ def _on_teeth(wobble: _Wobble, fitted: _Fitted, period: float) -> FloatArray:
     return _in_order(teeth, off)
 
 
+@compiled
 def _in_order(teeth: FloatArray, off: FloatArray) -> FloatArray:
     """Return for each row the one of its teeth (k, n) that together cost least, none before the row ahead of it."""
-    total, before = off[:, 0], np.zeros(off.shape, dtype=np.int64)
-    for i in range(1, off.shape[1]):
-        # a slow chip shows one sample in two rows, to within rounding of its instant
-        allowed = np.where(teeth[None, :, i - 1] <= teeth[:, i, None] + 1e-6, total[None, :], np.inf)
-        before[:, i] = np.argmin(allowed, axis=1)
-        total = off[:, i] + np.min(allowed, axis=1)
-    chosen = np.zeros(off.shape[1], dtype=np.int64)
-    chosen[-1] = int(np.argmin(total))
-    for i in range(off.shape[1] - 1, 0, -1):
-        chosen[i - 1] = before[chosen[i], i]
-    return np.asarray(teeth[chosen, np.arange(off.shape[1])])
+    kinds, rows = off.shape
+    total = off[:, 0].copy()
+    before = np.zeros((kinds, rows), np.int64)
+    for i in range(1, rows):
+        reached = np.full(kinds, np.inf)
+        for k in range(kinds):
+            for ahead in range(kinds):
+                # a slow chip shows one sample in two rows, to within rounding of its instant
+                if teeth[ahead, i - 1] <= teeth[k, i] + 1e-6 and total[ahead] < reached[k]:
+                    reached[k] = total[ahead]
+                    before[k, i] = ahead
+        total = reached + off[:, i]
+    chosen = np.empty(rows)
+    k = int(np.argmin(total))
+    for i in range(rows - 1, -1, -1):
+        chosen[i] = teeth[k, i]
+        k = before[k, i]
+    return chosen
 
 
 @dataclass(frozen=True)
