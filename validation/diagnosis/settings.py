@@ -305,7 +305,7 @@ class UnknownLaw:
     fitted : int
         Candidates that are fitted: time alone.
     share : float
-        Share of the excess that a law must explain: more than it leaves.
+        Share of the excess that a law must explain where it leaves more than noise: more than it leaves.
     held_out : float
         What it must gain on recordings held out: very strong evidence is 10 (Kass and Raftery, as for `Selection`).
     all : float

@@ -178,6 +178,16 @@ def _call(function: Callable[[Any, Any], Any], task: Task, shared: Any) -> tuple
         return task.name, function(task.argument, shared)
 
 
+#: how local processes are run. A machine that slept, or a command that was stopped for a while, hears nothing of its
+#: processes for minutes. Nobody reads where each worker stands a hundred times a second: with fifty ticks a second that
+#: takes three processes 2 s of 20 s, and 0.8 s with these
+_LOCAL = {
+    "distributed.scheduler.worker-ttl": None,
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+}
+
+
 @contextmanager
 def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
     """Connect to a running scheduler, or start local processes for as long as the block lasts."""
@@ -185,8 +195,7 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
     from distributed import Client, LocalCluster
 
     if scheduler is None:
-        # a machine that slept, or a command that was stopped for a while, hears nothing of its processes for minutes
-        with _deaf_children(), config.set({"distributed.scheduler.worker-ttl": None}):
+        with _deaf_children(), config.set(_LOCAL):
             cluster = LocalCluster(
                 n_workers=workers,
                 host="127.0.0.1",  # whoever reaches a scheduler runs what he likes

@@ -411,12 +411,15 @@ def _believed(
     at: Mapping[str, float],
     noise: NoiseModel,
 ) -> FoundLaw | None:
-    """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
+    """Return the law if it gains what it costs, and on recordings that took no part, and explains what there is.
+
+    That is most of the excess, or all that tests of residuals find: beside that a small excess is the scatter of noise.
+    """
     if _priced(fitted) + SELECTION.entry > base.score:
         return None
     share = _share(base.fit, fitted.fit, noise)
     heldout, chi2 = _held_out(base.fit, fitted.fit)
-    if not _holds(heldout, terms) or share < UNKNOWN_LAW.share:
+    if not _holds(heldout, terms) or (share < UNKNOWN_LAW.share and fitted.unmodelled()):
         return None
     total = sum(heldout.values()) if heldout else None
     about = tuple(term for term in terms if isinstance(term, SensorTerm))
