@@ -109,11 +109,10 @@ def _may_be_a_copy(found: Search) -> bool:
 
     Several effects on the motion may, and any beside which a law about the same has more to gain than an effect costs:
     a disc that dries passes for thin air, a bias that settles for one that drifts. (Beside samples that were lost a
-    motion ends beside its best. What a free spin does not model takes up any further moment: of it only sensors are
-    asked.) Of those on a sensor several do in a free spin, where much that nobody knows stands in for what a wrong
-    effect leaves: a bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all ordinary
-    errors are fitted at once, several of a sensor are no stack; nor are lost samples, without which no law would be
-    fitted.
+    motion ends beside its best.) Of those on a sensor several do in a free spin, where much that nobody knows stands in
+    for what a wrong effect leaves: a bias that settles passes for a bias beside a sensitivity to what dies away, too.
+    Where all ordinary errors are fitted at once, several of a sensor are no stack; nor are lost samples, without which
+    no law would be fitted.
     """
     candidates = found.final.hypothesis.candidates
     lasting = [c.row for c in candidates if not c.row.brief and not c.fixed_values]
@@ -124,8 +123,7 @@ def _may_be_a_copy(found: Search) -> bool:
         return True
     if found.at_once or any(c.fixed_values for c in candidates):
         return False
-    about = BOARD.intersection(acted_on) if weak else set(acted_on)
-    return left_to_gain(found.final.fit, about) > SELECTION.entry
+    return left_to_gain(found.final.fit, acted_on) > SELECTION.entry
 
 
 def recalibrations(found: Search) -> dict[str, Recalibration]:

@@ -37,6 +37,7 @@ from discsim.validation.identification.gauss_newton import Fit, reduced_each, re
 from discsim.validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
 from discsim.validation.identification.normal_equations import common_step, nuisance_step
 from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants import Plant
 from discsim.validation.identification.plants.law_terms import Term
 
 __all__ = ["FoundLaw", "LawOfAll", "find_law", "left_to_gain"]
@@ -172,8 +173,7 @@ def find_law(search: Search, *, instead: bool = True, moves_out: bool = False) -
     start = _beside(relaxed_fit, own, own_at, noise)
     states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
     at = reference_of(states)
-    # what a free spin does not model takes up any further moment
-    motion = () if plant.weakly_identified else plant.laws.terms
+    motion = _on_motion(plant)
     about = sensor_library(start)
     if moves_out:
         about = [term for term in about if (term.sensor, term.kind) in _OF_WHAT_MOVES]
@@ -194,6 +194,11 @@ def find_law(search: Search, *, instead: bool = True, moves_out: bool = False) -
     else:
         law = _believed(*_more_terms(start, own, own_at, fitted, term, at), base, at, start.noise)
     return None if law is None or (instead and not _does_better(law, best)) else law
+
+
+def _on_motion(plant: Plant) -> tuple[Term, ...]:
+    """Return the terms on a plant's motion; none of a free spin: what it does not model takes up any further moment."""
+    return () if plant.weakly_identified else plant.laws.terms
 
 
 def _does_better(law: FoundLaw, fitted: ContinuousFit) -> bool:
@@ -233,9 +238,9 @@ def left_to_gain(fit: Fit, about: Collection[str]) -> float:
     if fit.from_release:
         return 0.0
     gains = [0.0]
-    if "motion" in about and fit.plant.laws.terms:
+    if "motion" in about and (motion := _on_motion(fit.plant)):
         at = reference_of([state_of(trajectory, fit.values(i)) for i, trajectory in enumerate(fit.trajectories)])
-        gains += [gain for gain, _, _ in candidate_laws(fit, fit.parameters, fit.plant.laws.terms, at)]
+        gains += [gain for gain, _, _ in candidate_laws(fit, fit.parameters, motion, at)]
     terms = sensor_library(fit, about, _NO_COPY)
     gains += [gain for gain, _, _ in _worth(fit, terms, asked_of_sensors(fit, fit.parameters, terms))]
     return max(gains)
