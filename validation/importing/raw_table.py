@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from discsim.arrays import BoolArray, IntArray
 from discsim.errors import InputError, printable
 from discsim.validation.importing.cell_texts import CellTexts, number, packed
-from discsim.validation.importing.clock import stamp_seconds
 from discsim.validation.importing.labelled import RecordLines, labelled_cells, stamped
+from discsim.validation.importing.stamps import stamp_seconds
 from discsim.validation.importing.text_lines import TextLines
 
 __all__ = ["REPAIRS", "Layout", "RawTable", "Repair", "RepairList", "read_raw"]

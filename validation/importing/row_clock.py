@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray, IntArray
-from discsim.validation.importing.clock import Break, mended, stamp_seconds
+from discsim.validation.importing.clock import Break, mended
 from discsim.validation.importing.import_map import ImportMap, TimeBase
 from discsim.validation.importing.raw_table import RawTable, RepairList
 from discsim.validation.importing.shared_stamps import evened
+from discsim.validation.importing.stamps import stamp_seconds
 from discsim.validation.importing.unpadded import unpadded
 
 __all__ = ["RowClock", "added_up", "row_clock"]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from support.made_logs import LANDING, RATE, RELEASE, made_log, three, write_table
 
-from discsim.validation.importing.clock import iso_seconds
 from discsim.validation.importing.imported_log import import_log
+from discsim.validation.importing.stamps import iso_seconds
 
 LOG = made_log()
 READINGS = [

@@ -99,3 +99,16 @@ def test_a_map_s_encoding_that_is_not_the_log_s_is_refused_in_one_line(tmp_path,
         import_recording(tmp_path / "log.csv", read_map(tmp_path / "map.toml"))
     assert str(refused.value).isprintable()
     assert len(str(refused.value)) < 2000
+
+
+@pytest.mark.parametrize("at", [0.4, 1.0])
+def test_zeros_that_a_power_cut_left_make_no_log_binary(tmp_path, at):
+    """A card's file is laid out in blocks; those that no row was written to stay zeros."""
+    raw = table(tmp_path / "log.csv", "utf-8", HEADERS["gb18030"])
+    lines = raw.read_bytes().split(b"\n")
+    place = round(at * len(lines))
+    raw.write_bytes(b"\n".join([*lines[:place], bytes(1 << 15), *lines[place:]]))
+    assert encoding_of(raw) == "utf-8"
+    (tmp_path / "map.toml").write_text(map_text(sniff(raw)), encoding="utf-8")
+    found = import_recording(raw, read_map(tmp_path / "map.toml"))
+    assert found.recording.samples["gyroscope"].t.size >= LOG.t.size - 1

@@ -12,8 +12,9 @@ from numpy.testing import assert_allclose
 from discsim.errors import InputError
 from discsim.validation.importing import Imported, find_map, import_recording, parse_rows, read_map
 from discsim.validation.importing.cell_texts import number
-from discsim.validation.importing.clock import iso_seconds, mended
+from discsim.validation.importing.clock import mended
 from discsim.validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
+from discsim.validation.importing.stamps import iso_seconds
 from discsim.validation.importing.timing import row_timing
 
 

@@ -12,8 +12,8 @@ from support.made_logs import DEG, G0, RELEASE, made_log, three, write_table
 
 from discsim.errors import InputError
 from discsim.validation.importing import import_recording, read_map, read_readings
-from discsim.validation.importing.clock import iso_seconds
 from discsim.validation.importing.sniffing import map_text, opened, sniff, stretches
+from discsim.validation.importing.stamps import iso_seconds
 
 XYZ = ("x", "y", "z")
 LOG = made_log()
@@ -49,6 +49,14 @@ STAMPS = {
     "points in the date": lambda h, m, s, ms: f"1.6.2025 {h}:{m:02d}:{s:02d}.{ms:03d}",
     "morning and afternoon": lambda h, m, s, ms: f"6/1/2025 {h - 12}:{m:02d}:{s:02d}.{ms:03d} PM",
     "no zeros before": lambda h, m, s, ms: f"2025-6-1 {h}:{m:02d}:{s:02d}.{ms:03d}",
+    "C": lambda h, m, s, ms: f"Sun Jun  1 {h:02d}:{m:02d}:{s:02d}.{ms:03d} 2025",
+    "a shell's date": lambda h, m, s, ms: f"Sun Jun  1 {h - 12:02d}:{m:02d}:{s:02d}.{ms:03d} PM CEST 2025",
+    "ts": lambda h, m, s, ms: f"Jun 01 {h:02d}:{m:02d}:{s:02d}.{ms:03d}",
+    "mail": lambda h, m, s, ms: f'"Sun, 01 Jun 2025 {h:02d}:{m:02d}:{s:02d}.{ms:03d} +0200"',
+    "a viewer of logs": lambda h, m, s, ms: f'"Jun 1, 2025 @ {h:02d}:{m:02d}:{s:02d}.{ms:03d}"',
+    "digits alone": lambda h, m, s, ms: f"20250601{h:02d}{m:02d}{s:02d}{ms:03d}",
+    "digits in groups": lambda h, m, s, ms: f"20250601_{h:02d}{m:02d}{s:02d}_{ms:03d}",
+    "as the names of files are": lambda h, m, s, ms: f"2025-06-01-{h:02d}-{m:02d}-{s:02d}-{ms:03d}",
     "minutes and seconds alone": lambda h, m, s, ms: f"{m:02d}:{s:02d}.{ms:03d}",
 }
 
@@ -63,6 +71,11 @@ def test_a_date_with_the_month_in_letters_is_that_day():
     assert iso_seconds("10-Jun-2024 06:13:20.125") == iso_seconds("2024-06-10 06:13:20.125")
     assert iso_seconds("1 December 24 06:13:20") == iso_seconds("2024-12-01 06:13:20")
     assert iso_seconds("10-Foo-2024 06:13:20") is None
+    assert iso_seconds("Mon Jun 10 06:13:20 2024") == iso_seconds("2024-06-10 06:13:20")
+    assert iso_seconds("June 10, 2024 6:13:20 PM") == iso_seconds("2024-06-10 18:13:20")
+    assert iso_seconds("20240610T061320.5Z") == iso_seconds("20240610061320500") == iso_seconds("2024-06-10 06:13:20.5")
+    # syslog and `ts` write no year: what goes by between two stamps is right
+    assert iso_seconds("Jun 11 06:13:20") - iso_seconds("Jun 10 06:13:20") == 86400
 
 
 def test_a_remark_above_numbers_without_names_makes_no_header_of_them(tmp_path):
@@ -74,7 +87,9 @@ def test_a_remark_above_numbers_without_names_makes_no_header_of_them(tmp_path):
     assert 'columns = ["c1", "c2"' in text
 
 
-@pytest.mark.parametrize("cell", ["14:61:00.5", "32/01/2025 10:00:00", "a:b", "20250601", "1,5", "99:99.1"])
+@pytest.mark.parametrize(
+    "cell", ["14:61:00.5", "32/01/2025 10:00:00", "a:b", "20250601", "1,5", "99:99.1", "20251361101010"]
+)
 def test_what_is_no_time_is_none(cell):
     assert iso_seconds(cell) is None
 

@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element, iterparse
 import numpy as np
 
 from discsim.files import BLOCK
-from discsim.validation.importing.clock import iso_seconds
 from discsim.validation.importing.logs.tables import Log, Rows, chosen
+from discsim.validation.importing.stamps import iso_seconds
 
 __all__ = ["begins", "read"]
 

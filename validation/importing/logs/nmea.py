@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from discsim.validation.importing.clock import DAY, EPOCH
 from discsim.validation.importing.logs.tables import Log, Rows, chosen, course_velocity
+from discsim.validation.importing.stamps import DAY, EPOCH
 
 __all__ = ["SENTENCES", "begins", "read", "read_sentences"]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
-from discsim.validation.importing.clock import EPOCH
+from discsim.validation.importing.stamps import EPOCH
 
 __all__ = ["Log", "Rows", "Table", "chosen", "course_velocity", "positions", "write_table"]
 

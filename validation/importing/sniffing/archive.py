@@ -16,9 +16,8 @@ from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
 from discsim.files import endless
-from discsim.validation.importing import json_records, spreadsheet, teleplot
 from discsim.validation.importing.logs import kind_of, write_tables
-from discsim.validation.importing.sniffing import value_rows
+from discsim.validation.importing.other_forms import writer_of
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
 
@@ -67,7 +66,7 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
                 say(note)
             logged = tables
         elif logged.is_file():
-            logged = _as_records(logged, Path(place), say)
+            logged = _as_tables(logged, Path(place), say)
         elif logged.is_dir():
             logged = _with_tracks(logged, Path(place) / "beside" / (logged.resolve().name or "log"), say)
         try:
@@ -76,20 +75,16 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
             raise InputError(str(error).replace(str(logged), str(raw))) from None
 
 
-def _as_records(logged: Path, place: Path, say: Callable[[str], None]) -> Path:
-    """Return a file that is a table as it is, or what it holds as a table, or a folder of them, in ``place``.
-
-    The records of JSON and of a spreadsheet may be a row for each value in turn.
-    """
-    write, turn = _to_records(logged), 0
+def _as_tables(logged: Path, place: Path, say: Callable[[str], None]) -> Path:
+    """Return a file that is a table as it is, or what it holds as a table, or a folder of them, in ``place``."""
+    write, turn = writer_of(logged), 0
     while write is not None:
-        table = place / f"records-{turn}" / logged.name
+        table = place / f"tables-{turn}" / logged.name
         table.parent.mkdir()
         for note in write(logged, table):
             say(note)
         logged, turn = table, turn + 1
-        again = turn == 1 and write is not value_rows.write_records and table.is_file() and value_rows.begins(table)
-        write = value_rows.write_records if again else None
+        write = writer_of(table, again=True) if table.is_file() and turn == 1 else None
     return logged
 
 
@@ -97,14 +92,14 @@ def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path
     """Return the folder itself, or where receivers' tracks or JSON are in it ``folder``, their tables and all else."""
     children = [child for child in sorted(logged.iterdir())[:MAX_FILES] if child.is_file()]
     tracks = {child: kind for child in children if (kind := kind_of(child)) is not None and kind.fixes}
-    records = {child: write for child in children if (write := _to_records(child)) is not None}
-    if not records and (not tracks or len(children) == len(tracks)):
+    rewritten = {child: write for child in children if (write := writer_of(child)) is not None}
+    if not rewritten and (not tracks or len(children) == len(tracks)):
         return logged
     folder.mkdir(parents=True)
     for child in logged.iterdir():
-        if child not in tracks and child not in records:
+        if child not in tracks and child not in rewritten:
             _linked(child, folder / child.name)
-    for child, write in records.items():
+    for child, write in rewritten.items():
         try:
             notes = write(child, folder / child.name)
         except InputError:  # a description beside the readings: it is named with what else could not be read
@@ -132,17 +127,6 @@ def _flattened(tables: Path) -> None:
         for table in tables.iterdir():
             table.rename(tables.parent / f"{tables.stem}-{table.name}")
         tables.rmdir()
-
-
-def _to_records(path: Path) -> Callable[[Path, Path], list[str]] | None:
-    """Return what writes a file's records as tables, and what to say of them; None where it is a table as it is."""
-    if json_records.begins(path):
-        return json_records.write_records
-    if spreadsheet.begins(path):
-        return spreadsheet.write_sheets
-    if value_rows.begins(path):
-        return value_rows.write_records
-    return teleplot.write_joined if teleplot.begins(path) else None
 
 
 def _linked(source: Path, target: Path) -> None:

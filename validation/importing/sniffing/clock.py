@@ -10,8 +10,7 @@ from itertools import islice
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.validation.importing.clock import DATED, is_stamp, mended, stamp_seconds
-from discsim.validation.importing.clock import EPOCH as YEAR_2000
+from discsim.validation.importing.clock import mended
 from discsim.validation.importing.row_clock import added_up
 from discsim.validation.importing.shared_stamps import evened, repeats
 from discsim.validation.importing.sniffing.coarse_stamps import Counted, counted_rows
@@ -27,6 +26,8 @@ from discsim.validation.importing.sniffing.names import (
 )
 from discsim.validation.importing.sniffing.preamble import stated_rate
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
+from discsim.validation.importing.stamps import DATED, is_stamp, stamp_seconds
+from discsim.validation.importing.stamps import EPOCH as YEAR_2000
 from discsim.validation.importing.unpadded import unpadded
 
 __all__ = ["Clock", "clocks_of", "counter_note", "moment_of", "seconds", "with_shared_stamps", "written_unit"]

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import GAPS
-from discsim.validation.importing.clock import is_stamp
 from discsim.validation.importing.labelled import names_of_list, names_of_records
 from discsim.validation.importing.raw_table import Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.text import encoding_of
+from discsim.validation.importing.stamps import is_stamp
 from discsim.validation.importing.text_lines import TextLines
 
 __all__ = ["Dialect", "dialect_of"]

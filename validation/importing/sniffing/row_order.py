@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.validation.importing.clock import is_stamp, stamp_seconds
 from discsim.validation.importing.sniffing.groups import Numbers
 from discsim.validation.importing.sniffing.names import is_time_name
+from discsim.validation.importing.stamps import is_stamp, stamp_seconds
 
 __all__ = ["RowOrder", "order_of"]
 

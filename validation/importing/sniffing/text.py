@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 
 from discsim.errors import InputError
@@ -23,7 +24,14 @@ SIGNATURES = (
     (b"\xd0\xcf\x11\xe0", "an old Excel or Word document; export it as CSV"),
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"\x89HDF", "an HDF5 file; write its tables as CSV"),
-    (b"SQLite format 3", "an SQLite data base; write its tables as CSV"),
+    (b"MATLAB 7.3 MAT-file", "a MATLAB file of version 7.3; save it by `save(FILE, '-v7')`, or tables by writetable"),
+    (b"SQLite format 3", "an SQLite data base among other files; import that file itself"),
+    (b"PAR1", "a Parquet table; write it as CSV (in Python: pandas.read_parquet(FILE).to_csv(OTHER))"),
+    (b"ARROW1", "an Arrow table; write it as CSV (in Python: pandas.read_feather(FILE).to_csv(OTHER))"),
+    (b"\x80\x04\x95", "a pickle of Python's, which may run anything once it is opened; write its table as CSV"),
+    (b"\x80\x05\x95", "a pickle of Python's, which may run anything once it is opened; write its table as CSV"),
+    (b"TDSm", "a TDMS file of LabVIEW; write its channels as CSV (in Python: nptdms.TdmsFile(FILE).as_dataframe())"),
+    (b"#ROSBAG V2", "a bag of ROS 1; make it an MCAP (`mcap convert FILE OTHER.mcap`)"),
     (
         b"FMT,",
         "an ArduPilot text log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
@@ -42,6 +50,9 @@ _BOMS = (
 #: Encodings of Windows in Korea, Japan, China and Taiwan, and of Cyrillic.
 FOREIGN = ("cp949", "cp932", "gb18030", "big5", "cp1251")
 _LOOKED_AT = 1 << 16
+#: Zeros that a file system laid out for a log, and that no row was written over before the power went: no encoding of
+#: text has so many in a row.
+_BLANK = re.compile(rb"\0{16,}")
 _CONTROL = frozenset(range(1, 32)) - {9, 10, 12, 13, 27}  # what no text has: not tab, line ends, form feed, escape
 
 
@@ -67,6 +78,7 @@ def encoding_of(path: Path) -> str:
     for mark, encoding in _BOMS:
         if head.startswith(mark):
             return encoding
+    head = _BLANK.sub(b"", head)
     if sum(head.count(byte) for byte in _CONTROL) > 0.01 * len(head):  # a damaged line of a text is far below
         raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
     if head.count(0):

@@ -7,8 +7,6 @@ nested has the names above it before its own (``accel_x``); numbers stay as they
 from __future__ import annotations
 
 import ast
-import csv
-import io
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,8 +14,9 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from discsim.errors import InputError, printable
+from discsim.validation.importing.other_forms.written import comma_separated, write_named
 
-__all__ = ["begins", "write_records"]
+__all__ = ["begins", "write_tables"]
 
 #: A record as it stands: an object of JSON, or a dictionary as Python prints it.
 _Record: TypeAlias = Mapping[str, Any]
@@ -45,7 +44,7 @@ def begins(path: Path) -> bool:
         return False
 
 
-def write_records(raw: Path, target: Path) -> list[str]:
+def write_tables(raw: Path, target: Path) -> list[str]:
     """Write the records of a file as ``target``, or as a folder of that name, and return what to say of them.
 
     Raises `InputError` for a file without records of numbers, one that is too large and one that cannot be read.
@@ -64,13 +63,7 @@ def write_records(raw: Path, target: Path) -> list[str]:
             raw, None, "is JSON without records of numbers in it; expected a list of them, or one in each line"
         )
     texts = {name: _text(raw, rows) for name, rows in tables.items()}
-    if len(texts) == 1:
-        target.write_text(next(iter(texts.values())), encoding="utf-8")
-    else:
-        target.mkdir()
-        for name, table in texts.items():
-            plain = re.sub(r"[^\w.-]+", "-", name)
-            (target / f"{plain}.csv").write_text(table, encoding="utf-8")
+    write_named(target, texts)
     counted = ", ".join(
         f"{len(rows)} of {printable(name)}" if name else str(len(rows)) for name, rows in tables.items()
     )
@@ -157,11 +150,7 @@ def _text(raw: Path, records: Sequence[_Record]) -> str:
     names = list(dict.fromkeys(name for row in rows for name in row))
     if len(names) > MAX_COLUMNS:
         raise InputError.at(raw, None, f"is JSON of {len(names)} columns; expected a record for each reading")
-    written = io.StringIO()
-    writer = csv.writer(written, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([row.get(name, "") for name in names] for row in rows)
-    return written.getvalue()
+    return comma_separated([names, *([row.get(name, "") for name in names] for row in rows)])
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, str]]:

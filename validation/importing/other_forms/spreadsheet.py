@@ -6,18 +6,16 @@ folder with one for each sheet that holds rows of numbers. A well-kept reader op
 
 from __future__ import annotations
 
-import csv
 import datetime
-import io
-import re
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from discsim.errors import InputError
+from discsim.validation.importing.other_forms.written import comma_separated, write_named
 
-__all__ = ["begins", "write_sheets"]
+__all__ = ["begins", "write_tables"]
 
 #: First bytes of Excel's files up to 2003, which are those of an old Word document, too.
 _OLD = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
@@ -44,7 +42,7 @@ def begins(path: Path) -> bool:
     return within and bool({"xl/workbook.xml", "xl/workbook.bin", "content.xml"} & names)
 
 
-def write_sheets(raw: Path, target: Path) -> list[str]:
+def write_tables(raw: Path, target: Path) -> list[str]:
     """Write the sheets with rows of numbers as ``target``, or into a folder of that name, and return what to say.
 
     Raises `InputError` where the reader is not installed, the file cannot be read, or holds no rows of numbers.
@@ -65,13 +63,8 @@ def write_sheets(raw: Path, target: Path) -> list[str]:
     logged = {name: rows for name, rows in sheets.items() if _numbers(rows) >= FEWEST}
     if not logged:
         raise InputError.at(raw, None, "is a spreadsheet without rows of numbers in it; expected those of a log")
-    if len(logged) == 1:
-        target.write_text(_text(next(iter(logged.values()))), encoding="utf-8")
-    else:
-        target.mkdir()
-        for name, rows in logged.items():
-            plain = re.sub(r"[^\w.-]+", "-", name)
-            (target / f"{plain}.csv").write_text(_text(rows), encoding="utf-8")
+    texts = {name: comma_separated([_cell(cell) for cell in row] for row in rows) for name, rows in logged.items()}
+    write_named(target, texts)
     left = [name for name in sheets if name not in logged]
     said = f"{raw.name}: a spreadsheet; read: {', '.join(logged)}" + f"; not read: {', '.join(left)}" * bool(left)
     return [said]
@@ -80,12 +73,6 @@ def write_sheets(raw: Path, target: Path) -> list[str]:
 def _numbers(rows: Sequence[Sequence[Any]]) -> int:
     """Return how many rows have two numbers at least."""
     return sum(sum(isinstance(cell, float | int) for cell in row) >= 2 for row in rows)
-
-
-def _text(rows: Sequence[Sequence[Any]]) -> str:
-    written = io.StringIO()
-    csv.writer(written, lineterminator="\n").writerows([_cell(cell) for cell in row] for row in rows)
-    return written.getvalue()
 
 
 def _cell(value: Any) -> str:

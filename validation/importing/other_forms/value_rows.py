@@ -14,10 +14,10 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import number
-from discsim.validation.importing.clock import iso_seconds
 from discsim.validation.importing.sniffing.names import is_time_name, read_name
+from discsim.validation.importing.stamps import iso_seconds
 
-__all__ = ["begins", "write_records"]
+__all__ = ["begins", "write_tables"]
 
 #: What the column of the values is called, and those of their names, the wider one first.
 _VALUE = {"value", "val", "reading", "payload"}
@@ -109,7 +109,7 @@ def _with_names(plain: _Layout, rows: Iterable[Sequence[str]]) -> _Layout | None
     return found if sum(read_name(name).axis is not None for name in names) > 2 else None
 
 
-def write_records(raw: Path, target: Path) -> list[str]:
+def write_tables(raw: Path, target: Path) -> list[str]:
     """Write the records of a table as ``target``, and return what to say.
 
     Values at one time are a record. Where each has a time of its own a record goes on until a name comes again, and has

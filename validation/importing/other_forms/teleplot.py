@@ -14,7 +14,7 @@ from pathlib import Path
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import number
 
-__all__ = ["begins", "write_joined"]
+__all__ = ["begins", "write_tables"]
 
 #: Milliseconds since 1970 are more than this from March 1973 on, and seconds for 3000 years not.
 MS = 1e11
@@ -30,7 +30,7 @@ def begins(path: Path) -> bool:
         return False
 
 
-def write_joined(raw: Path, target: Path) -> list[str]:
+def write_tables(raw: Path, target: Path) -> list[str]:
     """Write a table's records as ``target``, and return what to say.
 
     Its time is that of the day; where it is too small for ms it is in s, whatever its name says. Raises `InputError`

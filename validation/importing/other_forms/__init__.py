@@ -1,0 +1,35 @@
+"""Files that are no table of text as loggers write it, rewritten as one.
+
+A form is a module that tells such a file by its beginning (`begins`) and writes it as comma-separated text, or as a
+folder of several (`write_tables`), and returns what to say of it. `writer_of` chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from discsim.validation.importing.other_forms import (
+    array_file,
+    database,
+    json_records,
+    line_protocol,
+    spreadsheet,
+    teleplot,
+    unit_cells,
+    value_rows,
+)
+
+__all__ = ["writer_of"]
+
+_FORMS = (json_records, spreadsheet, array_file, database, line_protocol, value_rows, teleplot, unit_cells)
+#: What a table of another form may be once more: a row for each value, or cells with their units.
+_AGAIN = (value_rows, unit_cells)
+
+
+def writer_of(path: Path, *, again: bool = False) -> Callable[[Path, Path], list[str]] | None:
+    """Return what writes a file as tables and says what it did; None where it is a table as it is.
+
+    ``again``: the file was written by another form.
+    """
+    return next((form.write_tables for form in (_AGAIN if again else _FORMS) if form.begins(path)), None)

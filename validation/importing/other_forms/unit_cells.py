@@ -1,0 +1,110 @@
+"""Numbers with their unit in the same cell (`9.81 m/s^2`, `12ms`), as people print them: the units moved to the header.
+
+Takes a table with a line of names; each column must have one unit, or none, in all its first cells.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from itertools import chain, repeat
+from pathlib import Path
+from typing import NamedTuple
+
+from discsim.errors import InputError
+from discsim.validation.importing.cell_texts import GAPS
+from discsim.validation.importing.other_forms.written import comma_separated, write_named
+
+__all__ = ["begins", "write_tables"]
+
+_ENDS = re.compile(r"\r\n?|\n")
+_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?"
+#: A number and what stands behind it: no digit, and no sign that would make it a date or a time.
+_CELL = re.compile(rf"\s*({_NUMBER})\s*([^\s\d:.,;/-][^\s:;]*(?: [^\s\d:;][^\s:;]*)?)\s*")
+_PLAIN = re.compile(rf"\s*(?:{_NUMBER})?\s*")
+#: Rows that are looked at, the fewest of them, and the columns with a unit without which nothing is moved.
+_ROWS, _FEWEST, _COLUMNS = 50, 3, 3
+#: Bytes of a table that is read whole, and of its beginning.
+MAX_BYTES, _HEAD = 1 << 29, 1 << 16
+
+
+def begins(path: Path) -> bool:
+    """Tell a table three of whose columns have numbers with a unit in all of the first rows."""
+    return _layout(path) is not None
+
+
+class _Layout(NamedTuple):
+    """How a table is written, and the unit of each column, empty where it has none."""
+
+    encoding: str
+    separator: str
+    units: tuple[str, ...]
+
+
+def _layout(path: Path) -> _Layout | None:
+    """Return how a table with units in its cells is written; None where this is none."""
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD)
+    except OSError:
+        return None
+    if b"\0" in head:
+        return None
+    encoding = _encoding(head)
+    lines = [line for line in _ENDS.split(head.decode(encoding, "replace"))[:-1] if line.strip()][: _ROWS + 1]
+    for separator in ";\t|,":
+        try:
+            rows = list(csv.reader(lines, delimiter=separator))
+        except csv.Error:  # a cell that is longer than any number
+            return None
+        if len(rows) > _FEWEST and len({len(row) for row in rows}) == 1 and len(rows[0]) >= _COLUMNS:
+            units = [_unit([row[k] for row in rows[1:]]) for k in range(len(rows[0]))]
+            names = not any(_PLAIN.fullmatch(cell) or _CELL.fullmatch(cell) for cell in rows[0])
+            if names and sum(bool(unit) for unit in units) >= _COLUMNS:
+                return _Layout(encoding, separator, tuple(unit or "" for unit in units))
+    return None
+
+
+def _encoding(head: bytes) -> str:
+    """Return UTF-8 where the whole lines of a beginning are that, else Windows' Latin-1: units have degree signs."""
+    try:
+        head[: head.rfind(b"\n")].decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def _unit(cells: Sequence[str]) -> str | None:
+    """Return the unit behind each number of some cells; None where they have none, or not the same one."""
+    full = [cell for cell in cells if cell.strip() and cell.strip().lower() not in GAPS]
+    found = [_CELL.fullmatch(cell) for cell in full]
+    units = {match[2].strip() for match in found if match is not None}
+    return units.pop() if full and all(found) and len(units) == 1 else None
+
+
+def write_tables(raw: Path, target: Path) -> list[str]:
+    """Write a table with the units of its cells in the line of names, and return what to say.
+
+    A cell with another unit, or none, stays as it is, and is found with what else cannot be read. Raises `InputError`
+    for a table that is too large.
+    """
+    layout, size = _layout(raw), raw.stat().st_size
+    if layout is None or size > MAX_BYTES:
+        raise InputError.at(raw, None, f"has units in the cells of its {size >> 20} MB; expected them in a header")
+    try:
+        with raw.open(encoding=layout.encoding, errors="replace") as stream:
+            names, *rows = csv.reader((line for line in stream if line.strip()), delimiter=layout.separator)
+    except csv.Error as error:
+        raise InputError.at(raw, None, f"cannot be read as a table ({error}); expected cells of numbers") from None
+    named = zip(names, layout.units, strict=True)
+    header = [f"{name.strip()} ({unit})" if unit else name.strip() for name, unit in named]
+    moved = [list(map(_bare, row, chain(layout.units, repeat("")))) for row in rows]
+    write_named(target, {raw.stem: comma_separated([header, *moved])})
+    said = ", ".join(dict.fromkeys(filter(None, layout.units)))
+    return [f"{raw.name}: units stand in its cells ({said}); moved to the names of the columns"]
+
+
+def _bare(cell: str, unit: str) -> str:
+    match = _CELL.fullmatch(cell) if unit else None
+    return match[1] if match is not None and match[2].strip() == unit else cell
