@@ -11,7 +11,14 @@ import typer
 from discsim.errors import InputError
 from discsim.files import read_text, write_bytes, write_text
 from discsim.validation.challenge.masks import masked_results
-from discsim.validation.challenge.report.document import PREFIX, masks_text, pooled, result_text, with_part
+from discsim.validation.challenge.report.document import (
+    PREFIX,
+    masks_text,
+    pooled,
+    result_text,
+    runs_text,
+    with_part,
+)
 from discsim.validation.challenge.report.page import draw_all
 from discsim.validation.challenge.scores.result import Result, read_result, result_file
 from discsim.validation.challenge.scores.scoring import NOTHING
@@ -27,6 +34,9 @@ def command(
     ] = None,
     masks: Annotated[list[Path] | None, typer.Option(help="Challenges with a mask; may repeat.")] = None,
     blank: Annotated[list[Path] | None, typer.Option(help="Challenges that conceal nothing; may repeat.")] = None,
+    runs: Annotated[
+        Path | None, typer.Option(help="Folder that --keep filled: a row for each challenge in it, into --page.")
+    ] = None,
     page: Annotated[Path, typer.Option(help="The page; its figures go into images beside it.")] = Path(
         "docs/challenge.md"
     ),
@@ -40,8 +50,8 @@ def command(
 
     Example: discsim study blind-test challenge --masks challenge-masks
     """
-    if out is None and not masks:
-        raise InputError("nothing to write; expected the folder of a challenge, or --masks")
+    if out is None and not masks and runs is None:
+        raise InputError("nothing to write; expected the folder of a challenge, --masks or --runs")
     plain: Result | None = None
     read = [] if out is None else [read_result(place) for place in (out, *(more or ()))]
     if not page.is_file():
@@ -59,10 +69,20 @@ def command(
         text = with_part(text, "result", result_text(plain, list(drawn), near, without))
     if masks:
         text = with_part(text, "masks", masks_text(masks, plain))
+    if runs is not None:
+        text = with_part(text, "runs", runs_text([read_result(file) for file in _kept(runs)]))
     write_text(page, text)
     if keep is not None and out is not None:
         for place, result in zip((out, *(more or ()), *(blank or ())), read, strict=True):
             _keep(result_file(place), keep / f"{result.seeds[0]}.json.gz")
+
+
+def _kept(folder: Path) -> list[Path]:
+    """Return the files that `--keep` left in a folder, by seed; raises `InputError` where there is none."""
+    files = sorted(folder.glob("*.json.gz"))
+    if not files:
+        raise InputError(f"{folder}: holds no challenge; expected a folder that --keep filled")
+    return files
 
 
 def _keep(file: Path, kept: Path) -> None:

@@ -317,6 +317,18 @@ def test_challenges_of_one_code_on_other_seeds_are_pooled_also_from_what_was_kep
         read_result(kept / "40.json.gz")
 
 
+def test_every_challenge_that_was_kept_is_a_row_of_the_page_on_runs(tmp_path, plain):
+    page, kept = tmp_path / "docs" / "runs.md", tmp_path / "kept"
+    documented(tmp_path / "docs" / "page.md", plain, "--keep", kept)
+    page.write_text("top\n<!-- runs -->\n<!-- /runs -->\nend\n")
+    run_study("blind-test", ["--runs", str(kept), "--page", str(page)])
+    (row,) = [line for line in page.read_text().splitlines() if line.startswith("| 40 to 42 |")]
+    assert "| 3 | 0.0 % (0 of 1) |" in row
+    assert "| 100.0 % (1 of 1) |" not in row  # one kind of other physics was concealed, and nobody answered
+    with pytest.raises(InputError, match="holds no challenge"):
+        run_study("blind-test", ["--runs", str(tmp_path), "--page", str(page)])
+
+
 def test_effects_near_their_limit_count_in_the_curve(tmp_path, plain, monkeypatch):
     """The same ones here, so there are twice as many."""
     near = tmp_path / "near" / "challenge.json"

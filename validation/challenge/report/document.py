@@ -1,7 +1,7 @@
 """What the page on the blind test says of finished challenges: result, confusions, failures, masks.
 
 The detection curve counts the effects of the mask near_limit, too. Challenges in which nothing is concealed count for
-the share of false alarms, since an upper bound of 3 % takes 122 such cases and more.
+the share of false alarms, since an upper bound of 1.5 % takes 245 such cases and more.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from discsim.errors import InputError
 from discsim.validation.challenge.cases.draw import KINDS, PLANT_SHARES
 from discsim.validation.challenge.masks import MASK_HEADER, mask_row, masked_results
 from discsim.validation.challenge.report.page import (
+    MANY,
     SIZE,
     deviates_of,
     fault_of,
@@ -31,7 +32,7 @@ from discsim.validation.challenge.scores.result import Result, Scored, both_time
 from discsim.validation.challenge.scores.scoring import confusion, has_power_law
 from discsim.validation.reporting.markdown import table
 
-__all__ = ["masks_text", "result_text", "with_part"]
+__all__ = ["masks_text", "result_text", "runs_text", "with_part"]
 
 #: beginning of the names of the page's figures
 PREFIX = "challenge-"
@@ -116,7 +117,8 @@ def _goals(scored: Sequence[Scored], items: Sequence[Sized], blank: Sequence[Sco
     alarms = "false_alarm_rate"
     rates = {**rates_of(scored), alarms: rates_of([*scored, *blank])[alarms]}
     told = {"ok": "met", "FAIL": "**missed**"}
-    rows = [(*row, told.get(state, "")) for *row, state in goal_rows(rates, fit_curve(items))]
+    few = len(scored) + len(blank) < MANY
+    rows = [(*row, told.get(state, state)) for *row, state in goal_rows(rates, fit_curve(items), few=few)]
     return table(("", "share", "cases", "95 % interval", "goal", ""), rows)
 
 
@@ -219,6 +221,31 @@ def _failures(scored: Sequence[Scored]) -> str:
         plant = item.answer.plant.replace("_", " ")
         rows.append((fault_of(item), plant, hidden_of(item), size_of(item), said, f"`{item.reproduce}`"))
     return f"{lead}. {SIZE}\n\n" + table(("fault", "plant", "concealed", "size", "found", "alone"), rows)
+
+
+#: rate of the summary -> its column in the table of all runs
+_RUN_COLUMNS = {
+    "false_alarm_rate": "false alarms",
+    "right_set_rate_above_twice_the_limit": "right set above twice the limit",
+    "right_set_rate_above_twice_the_limit_in_free_spins": "in free spins",
+    "coverage_2sd": "parameters within 2 sd",
+    "off_catalogue_misnamed_rate": "misnamed",
+    "law_given_rate": "a law given",
+}
+
+
+def runs_text(results: Sequence[Result]) -> str:
+    """Return the table of challenges, a row each: seeds, code, cases, and the shares that they are judged by."""
+    rows = []
+    for result in results:
+        rates = rates_of(result.scored)
+        shares = [
+            f"{percent(rates[name])[0]} ({rates[name].hits} of {rates[name].of})" if rates[name].of else "–"
+            for name in _RUN_COLUMNS
+        ]
+        first, last = result.seeds
+        rows.append((f"{first} to {last}", f"`{result.code[:12]}`", str(len(result.scored)), *shares))
+    return table(("seeds", "code", "cases", *_RUN_COLUMNS.values()), rows)
 
 
 def masks_text(folders: Sequence[Path], plain: Result | None) -> str:

@@ -22,7 +22,7 @@ from discsim.validation.challenge.scores.result import Scored
 __all__ = ["HALF_GOAL", "Curve", "Sized", "allowed", "detections", "fit_curve", "has_curve"]
 
 #: the size at which half of the effects are named should be at most this, in detection limits
-HALF_GOAL = 1.5
+HALF_GOAL = 1.2
 #: a curve of one effect's own needs as many cases, and as many of either outcome
 LEAST_CASES, LEAST_OF_EITHER = 8, 2
 #: what a curve is sought among: half-detection sizes, widths in ln(size), shares missed however large the effect

@@ -326,10 +326,11 @@ def summary(
     alarm. Parameters of one case depend on each other; the intervals of the coverage allow for it.
     """
 
-    def above_twice(sizes: Sequence[float | None]) -> Rate:
-        """Return the share of right sets of cases whose size is known and at least two."""
+    def above_twice(sizes: Sequence[float | None], plant: str | None = None) -> Rate:
+        """Return the share of right sets of cases (of a plant) whose size is known and at least two."""
         pairs = zip(scored, sizes or [None] * len(scored), strict=True)
-        return rate(s.right_set for (a, _, s), size in pairs if a.effects and size is not None and size >= 2.0)
+        large = [(a, s) for (a, _, s), size in pairs if a.effects and size is not None and size >= 2.0]
+        return rate(s.right_set for a, s in large if plant in (None, a.plant))
 
     blank = [(d, s) for a, d, s in scored if a.kind in NOTHING]
     hidden = [s for a, _, s in scored if a.effects]
@@ -349,6 +350,7 @@ def summary(
         "false_alarm_rate": rate(d is not None and d["verdict"] in _ALARMS for d, _ in blank),
         "right_set_rate": rate(s.right_set for s in hidden),
         "right_set_rate_above_twice_the_limit": above_twice(strengths),
+        "right_set_rate_above_twice_the_limit_in_free_spins": above_twice(strengths, "free_spin"),
         "right_set_rate_where_told_apart": above_twice(told),
         "right_set_or_listed_confusion_rate": rate(s.within_confusion for s in hidden),
         "right_verdict_rate": rate(s.right_verdict for _, _, s in scored),
@@ -364,6 +366,7 @@ def summary(
         "exponent_within_2sd_rate": rate(abs(z) <= 2.0 for z in exponents),
         "heldout_improved_rate": rate(gained),
         "right_setup_rate": rate(s.right for a, _, s in scored if a.kind == "setup"),
+        "right_verdict_like_real_rate": rate(s.right_verdict for _, s in real),
         "right_like_real_rate": rate(s.right for _, s in real),
         "found_like_real_rate": clustered_rate([id in s.named for id in a.effects] for a, s in real),
         "crash_rate": rate(s.crashed for _, _, s in scored),
