@@ -23,6 +23,7 @@ from discsim.model_file import Model, read_model
 from discsim.module import Module
 from discsim.recording import PLANTS, Plant
 from discsim.shipped import load_disc, load_site
+from discsim.validation.reporting.coordinates import coordinates
 
 __all__ = [
     "DateOption",
@@ -249,10 +250,10 @@ def at_place(environment: Environment, place: str | None, day: str | None) -> En
         return environment
     if place is None or day is None:
         raise InputError("--place LAT,LON and --date YYYY-MM-DD belong together: the field changes with the years")
-    try:
-        latitude, longitude = (float(part) for part in place.split(","))
-    except ValueError:
-        raise InputError(f"--place {place}: expected LAT,LON, degrees north and east, such as 52.52,13.41") from None
+    found = coordinates(place)
+    if found is None:
+        raise InputError(f"--place {place}: expected LAT,LON, degrees north and east, such as 52.52,13.41")
+    latitude, longitude = found
     try:
         when = date.fromisoformat(day)
     except ValueError:

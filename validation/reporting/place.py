@@ -10,6 +10,7 @@ from discsim.arrays import FloatArray
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import Recording
+from discsim.validation.reporting.coordinates import coordinates
 from discsim.validation.reporting.options import at_place
 
 __all__ = ["field_read", "swapped_place"]
@@ -39,8 +40,10 @@ def swapped_place(
     sizes = [size for one in recordings if "magnetometer" in one and (size := field_read(one)) is not None]
     if place is None or day is None or not sizes:
         return None
-    first, _, second = (part.strip() for part in place.partition(","))
-    other = f"{second},{first}"
+    found = coordinates(place)
+    if found is None:
+        return None
+    other = f"{found[1]:g},{found[0]:g}"
     try:
         fields = [at_place(Environment(), one, day).magnetic_field for one in (place, other)]
     except InputError:  # the other is no place

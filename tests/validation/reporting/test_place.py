@@ -10,6 +10,7 @@ import pytest
 from discsim.environment import Environment, world_magnetic_field
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
+from discsim.validation.reporting.coordinates import coordinates
 from discsim.validation.reporting.options import at_place
 from discsim.validation.reporting.place import field_read, swapped_place
 
@@ -74,3 +75,30 @@ def test_a_field_that_agrees_with_neither_place_and_fields_that_are_alike_say_no
 def test_the_size_of_a_field_read_all_round_is_that_without_the_hard_iron(iron):
     """300 readings of 0.5 uT each put the radius within 0.1 uT, three of its sigmas."""
     assert field_read(turned(48.0, iron)) == pytest.approx(48.0, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("written", "place"),
+    {
+        "37.57 126.98": (37.57, 126.98),
+        "37,57; 126,98": (37.57, 126.98),
+        "37.57° N, 126.98° E": (37.57, 126.98),
+        "126.98E,37.57N": (37.57, 126.98),
+        "33,86 S 151,2 E": (-33.86, 151.2),
+        "37°34'12\"N 126°58'48″E": (37.57, 126.98),
+        "N37 34.2 W126 58.8": (37.57, -126.98),
+        "-33.86,151.2": (-33.86, 151.2),
+    }.items(),
+)
+def test_a_place_is_read_as_maps_write_it(written, place):
+    assert coordinates(written) == pytest.approx(place, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "written",
+    ["Seoul", "37.57", "37,57,126,98", "1e3,5", "nan,5", "52.5N 13.4O", "5N,6N", "-5S,6E", "37°61'N 5°E", "1,2,3"],
+)
+def test_what_is_no_place_is_refused(written):
+    assert coordinates(written) is None
+    with pytest.raises(InputError, match="expected LAT,LON"):
+        at_place(Environment(), written, DAY)
