@@ -128,10 +128,10 @@ def _dated(text: str) -> float | None:
     """Return the seconds since 2000 of a date that is not written as ISO does, with a time behind it."""
     if named := _MONTH_DATE.fullmatch(text):
         day, name, year, rest = named.groups()
-        text = _numbered(year, name, day, rest)
-    elif named := _MONTH_FIRST.fullmatch(text):
+        return _since_2000(year, _month(name), day, _time_of_day(rest))
+    if named := _MONTH_FIRST.fullmatch(text):
         name, day, before, rest, behind = named.groups()
-        text = _numbered(before or behind or _NO_YEAR, name, day, rest)
+        return _since_2000(before or behind or _NO_YEAR, _month(name), day, _time_of_day(rest))
     match = _DATE.fullmatch(text)
     if match is None:
         return None
@@ -145,13 +145,12 @@ def _dated(text: str) -> float | None:
     return _since_2000(year, month, day, time)
 
 
-def _numbered(year: str, name: str, day: str, rest: str) -> str:
-    """Return a date whose month is in letters with its number; as it is where that is no month."""
-    known = name.lower() in _MONTHS
-    return f"{year if len(year) > 2 else f'20{year}'}-{_MONTHS.index(name.lower()) + 1 if known else name}-{day} {rest}"
+def _month(name: str) -> int:
+    """Return the number of a month by three letters; zero where they are none's."""
+    return _MONTHS.index(name.lower()) + 1 if name.lower() in _MONTHS else 0
 
 
-def _since_2000(year: str, month: str, day: str, time: float | None) -> float | None:
+def _since_2000(year: str, month: str | int, day: str, time: float | None) -> float | None:
     """Return the seconds since 2000 of a date in numbers and a time of that day, s; None where there is no such day."""
     whole = int(year) + 2000 * (int(year) < 100)
     try:

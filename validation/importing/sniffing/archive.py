@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from discsim.errors import InputError
 from discsim.files import endless
 from discsim.validation.importing.logs import kind_of, write_tables
-from discsim.validation.importing.other_forms import writer_of
+from discsim.validation.importing.sniffing.other_forms import writer_of
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
 
@@ -77,14 +77,15 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
 
 def _as_tables(logged: Path, place: Path, say: Callable[[str], None]) -> Path:
     """Return a file that is a table as it is, or what it holds as a table, or a folder of them, in ``place``."""
-    write, turn = writer_of(logged), 0
-    while write is not None:
-        table = place / f"tables-{turn}" / logged.name
+    for again in (False, True):
+        write = writer_of(logged, again=again) if logged.is_file() else None
+        if write is None:
+            break
+        table = place / f"tables-{int(again)}" / logged.name
         table.parent.mkdir()
         for note in write(logged, table):
             say(note)
-        logged, turn = table, turn + 1
-        write = writer_of(table, again=True) if table.is_file() and turn == 1 else None
+        logged = table
     return logged
 
 

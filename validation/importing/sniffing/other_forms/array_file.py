@@ -14,13 +14,19 @@ from typing import Any
 import numpy as np
 
 from discsim.errors import InputError
-from discsim.validation.importing.other_forms.written import comma_separated, write_named
+from discsim.validation.importing.sniffing.other_forms.written import (
+    FEWEST,
+    comma_separated,
+    first_bytes,
+    read_and_left,
+    write_named,
+)
 
 __all__ = ["begins", "write_tables"]
 
 _NPY, _MAT = b"\x93NUMPY", b"MATLAB 5.0 MAT-file"
-#: Rows without which arrays are no readings of a sensor, and columns above which one is none.
-FEWEST, WIDEST = 10, 40
+#: Columns above which an array is none of a sensor's readings.
+WIDEST = 40
 #: Bytes of a file that is read whole.
 MAX_BYTES = 1 << 30
 _AXES = "xyz"
@@ -28,13 +34,12 @@ _AXES = "xyz"
 
 def begins(path: Path) -> bool:
     """Tell a file of arrays by its first bytes; a zip, by arrays alone that are in it."""
+    head = first_bytes(path, len(_MAT))
+    if head.startswith((_NPY, _MAT)):
+        return True
+    if not head.startswith(b"PK\x03\x04"):
+        return False
     try:
-        with path.open("rb") as stream:
-            head = stream.read(len(_MAT))
-        if head.startswith((_NPY, _MAT)):
-            return True
-        if not head.startswith(b"PK\x03\x04"):
-            return False
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
     except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
@@ -67,13 +72,11 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     write_named(target, {"-".join(table)[:80]: _text(table) for table in tables.values()})
     read = "; ".join(f"{', '.join(table)} ({rows} rows)" for rows, table in tables.items())
     left = [name for name in found if name not in columns]
-    return [f"{raw.name}: a file of arrays; read: {read}" + f"; not read: {', '.join(left)}" * bool(left)]
+    return [read_and_left(raw, "a file of arrays", read, left)]
 
 
 def _loaded(raw: Path) -> Mapping[str, Any]:
-    with raw.open("rb") as stream:
-        matlab = stream.read(len(_MAT)) == _MAT
-    if matlab:
+    if first_bytes(raw, len(_MAT)) == _MAT:
         from scipy.io import loadmat
 
         return {name: value for name, value in loadmat(raw, squeeze_me=False).items() if not name.startswith("__")}

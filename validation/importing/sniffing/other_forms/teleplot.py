@@ -13,6 +13,7 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import number
+from discsim.validation.importing.sniffing.other_forms.written import first_bytes
 
 __all__ = ["begins", "write_tables"]
 
@@ -23,11 +24,7 @@ _BEGINS = re.compile(rb'(?:\xef\xbb\xbf)?timestamp\(ms\),[^\r\n]*,\r?\n"\d+(?:\.
 
 def begins(path: Path) -> bool:
     """Tell a table of Teleplot's by its first two lines: names, and numbers in quotes."""
-    try:
-        with path.open("rb") as stream:
-            return _BEGINS.match(stream.read(1 << 16)) is not None
-    except OSError:
-        return False
+    return _BEGINS.match(first_bytes(path, 1 << 16)) is not None
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:

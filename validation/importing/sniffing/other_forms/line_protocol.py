@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from discsim.errors import InputError
-from discsim.validation.importing.other_forms.written import comma_separated, write_named
+from discsim.validation.importing.sniffing.other_forms.written import comma_separated, first_bytes, write_named
 
 __all__ = ["begins", "write_tables"]
 
@@ -28,11 +28,7 @@ _UNITS = ((19, "ns"), (16, "us"), (13, "ms"), (0, "s"))
 
 def begins(path: Path) -> bool:
     """Tell the line protocol by its first lines, each a point; comments may stand before them."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(1 << 16)
-    except OSError:
-        return False
+    head = first_bytes(path, 1 << 16)
     lines = [line for line in head.decode("utf-8", "replace").split("\n")[:-1] if line.strip() and line[0] != "#"]
     return bool(lines) and all(_POINT.fullmatch(line) for line in lines[:_LOOKED_AT])
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import GAPS
-from discsim.validation.importing.other_forms.written import comma_separated, write_named
+from discsim.validation.importing.sniffing.other_forms.written import comma_separated, first_bytes, write_named
 
 __all__ = ["begins", "write_tables"]
 
@@ -44,11 +44,7 @@ class _Layout(NamedTuple):
 
 def _layout(path: Path) -> _Layout | None:
     """Return how a table with units in its cells is written; None where this is none."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(_HEAD)
-    except OSError:
-        return None
+    head = first_bytes(path, _HEAD)
     if b"\0" in head:
         return None
     encoding = _encoding(head)

@@ -7,24 +7,24 @@ from contextlib import closing
 from pathlib import Path
 
 from discsim.errors import InputError
-from discsim.validation.importing.other_forms.written import comma_separated, write_named
+from discsim.validation.importing.sniffing.other_forms.written import (
+    comma_separated,
+    first_bytes,
+    holds_log,
+    read_and_left,
+    write_named,
+)
 
 __all__ = ["begins", "write_tables"]
 
 _BEGINS = b"SQLite format 3\0"
-#: Rows of two numbers without which a table holds no log.
-FEWEST = 10
 #: Bytes of a file that is read whole.
 MAX_BYTES = 1 << 30
 
 
 def begins(path: Path) -> bool:
     """Tell an SQLite file by its first bytes."""
-    try:
-        with path.open("rb") as stream:
-            return stream.read(len(_BEGINS)) == _BEGINS
-    except OSError:
-        return False
+    return first_bytes(path, len(_BEGINS)) == _BEGINS
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:
@@ -44,7 +44,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
                 quoted = name.replace('"', '""')
                 rows = base.execute(f'SELECT * FROM "{quoted}"')
                 header, cells = [column[0] for column in rows.description], rows.fetchall()
-                if sum(sum(isinstance(cell, float | int) for cell in row) >= 2 for row in cells) < FEWEST:
+                if not holds_log(cells):
                     left.append(name)
                     continue
                 texts[name] = comma_separated([header, *([_cell(cell) for cell in row] for row in cells)])
@@ -53,7 +53,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     if not texts:
         raise InputError.at(raw, None, "is an SQLite data base without rows of numbers in it; expected those of a log")
     write_named(target, texts)
-    return [f"{raw.name}: a data base; read: {', '.join(texts)}" + f"; not read: {', '.join(left)}" * bool(left)]
+    return [read_and_left(raw, "a data base", ", ".join(texts), left)]
 
 
 def _cell(value: object) -> str:

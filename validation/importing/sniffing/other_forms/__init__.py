@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from discsim.validation.importing.other_forms import (
+from discsim.validation.importing.sniffing.other_forms import (
     array_file,
     database,
     json_records,

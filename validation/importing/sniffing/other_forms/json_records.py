@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from discsim.errors import InputError, printable
-from discsim.validation.importing.other_forms.written import comma_separated, write_named
+from discsim.validation.importing.sniffing.other_forms.written import comma_separated, first_bytes, write_named
 
 __all__ = ["begins", "write_tables"]
 
@@ -37,11 +37,7 @@ _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 
 def begins(path: Path) -> bool:
     """Tell a file that begins as an object of JSON, or as a list of such."""
-    try:
-        with path.open("rb") as stream:
-            return _BEGINS.match(stream.read(1 << 12)) is not None
-    except OSError:
-        return False
+    return _BEGINS.match(first_bytes(path, 1 << 12)) is not None
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:

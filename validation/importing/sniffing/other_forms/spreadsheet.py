@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import datetime
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from discsim.errors import InputError
-from discsim.validation.importing.other_forms.written import comma_separated, write_named
+from discsim.validation.importing.sniffing.other_forms.written import (
+    comma_separated,
+    holds_log,
+    read_and_left,
+    write_named,
+)
 
 __all__ = ["begins", "write_tables"]
 
 #: First bytes of Excel's files up to 2003, which are those of an old Word document, too.
 _OLD = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-#: Rows of two numbers or more without which a sheet holds no log: a description of the phone has fewer.
-FEWEST = 10
 #: Rows of a sheet are at most 2^20; more bytes than this in a packed file are no log's.
 MAX_BYTES = 1 << 29
 
@@ -60,19 +62,13 @@ def write_tables(raw: Path, target: Path) -> list[str]:
         sheets = {name: book.get_sheet_by_name(name).to_python() for name in book.sheet_names}
     except (CalamineError, OSError, ValueError) as error:
         raise InputError.at(raw, None, f"is a damaged spreadsheet ({error}); expected one that opens") from None
-    logged = {name: rows for name, rows in sheets.items() if _numbers(rows) >= FEWEST}
+    logged = {name: rows for name, rows in sheets.items() if holds_log(rows)}
     if not logged:
         raise InputError.at(raw, None, "is a spreadsheet without rows of numbers in it; expected those of a log")
     texts = {name: comma_separated([_cell(cell) for cell in row] for row in rows) for name, rows in logged.items()}
     write_named(target, texts)
     left = [name for name in sheets if name not in logged]
-    said = f"{raw.name}: a spreadsheet; read: {', '.join(logged)}" + f"; not read: {', '.join(left)}" * bool(left)
-    return [said]
-
-
-def _numbers(rows: Sequence[Sequence[Any]]) -> int:
-    """Return how many rows have two numbers at least."""
-    return sum(sum(isinstance(cell, float | int) for cell in row) >= 2 for row in rows)
+    return [read_and_left(raw, "a spreadsheet", ", ".join(logged), left)]
 
 
 def _cell(value: Any) -> str:
