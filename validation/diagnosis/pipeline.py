@@ -100,7 +100,10 @@ def _with_law_of_one(tried: Tried, question: Question) -> Tried:
     contradiction, ready = tried.contradiction, tried.prepared
     if contradiction is None or contradiction.lost or len(contradiction.against) != 1:
         return tried
-    begun, law = _law_before_effects(ready, question)
+    free = free_parameters(ready.setup)
+    problem = SearchProblem(ready.fitted, as_stated=ready.meant, free=free, effects=question.effects)
+    question.progress("looking for a law", 4, 5)
+    begun, law = _law_before_effects(problem)
     if law is None or law.law.target.partition(".")[0] not in contradiction.against:
         return tried
     return Tried(ready, None, begun, law) if law.explains_all else tried
@@ -142,24 +145,23 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     contradiction = contradiction_after(followed)
     if contradiction is not None:
         return Tried(ready, contradiction)
-    hints = (*ready.supposed, *setup.hints)
-    if ready.rows is None and moves_out(followed):
-        begun, law = _law_before_effects(ready, question, followed)
-        if law is not None:
-            return Tried(ready, None, begun, law)
-
     law_of_all = LawOfAll()
     problem = SearchProblem(
         ready.fitted,
         as_stated=ready.meant,
         followed=followed,
         free=free,
-        hints=hints,
+        hints=(*ready.supposed, *setup.hints),
         effects=question.effects,
         progress=progress,
         law=law_of_all,
     )
-    found = search(problem)
+    begun: Search | None = None
+    if ready.rows is None and moves_out(followed):
+        begun, law = _law_before_effects(problem, moving=True)
+        if law is not None:
+            return Tried(ready, None, begun, law)
+    found = search(problem, begun=begun)
     if law_of_all.found is not None:
         return Tried(ready, None, found.at_base(), law_of_all.found)
     if ready.rows is not None:  # no bent segments there: defects of continuity are wide, and the pure error is known
@@ -169,19 +171,14 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     return Tried(ready, None, found)
 
 
-def _law_before_effects(
-    ready: Prepared, question: Question, moving: Fit | None = None
-) -> tuple[Search, FoundLaw | None]:
+def _law_before_effects(problem: SearchProblem, *, moving: bool = False) -> tuple[Search, FoundLaw | None]:
     """Return where a search would begin, and the law found there without searching effects; None where none holds.
 
-    ``moving`` is the relaxed fit of bodies in which something moves out: no effect of the catalogue does.
+    ``moving`` is whether something moves out in the bodies: no effect of the catalogue does.
     """
-    question.progress("looking for a law", 4, 5)
-    free = free_parameters(ready.setup)
-    begun = screened(
-        SearchProblem(ready.fitted, as_stated=ready.meant, followed=moving, free=free, effects=question.effects)
-    )
-    return begun, find_law(begun, moves_out=moving is not None)
+    begun = screened(problem)
+    problem.progress("looking for a law", 4, 5)
+    return begun, find_law(begun, moves_out=moving)
 
 
 #: rounds in which segments are halved where the air's moment bends within them

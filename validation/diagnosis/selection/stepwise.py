@@ -66,14 +66,15 @@ _FROM_NOTHING = Anew()
 
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
 @np.errstate(over="ignore", invalid="ignore")
-def search(problem: SearchProblem, anew: Anew = _FROM_NOTHING) -> Search:
+def search(problem: SearchProblem, anew: Anew = _FROM_NOTHING, begun: Search | None = None) -> Search:
     """Find the effects that explain recordings of one plant.
 
     A search ``anew`` begins with the effects that one before it found, where they are worth their price here, too. It
-    is given up as it stands once it has come to two effects more than are of use.
+    is given up as it stands once it has come to two effects more than are of use. ``begun`` is where it begins, where
+    that is known (`screened`).
     """
     of_use, before = anew
-    found = screened(problem, before)
+    found = screened(problem, before) if begun is None else begun
     problem.progress("refitting candidates", 3, 4)
     law = problem.law if before is None else None
     found = _selected_forward(found if before is None else _taken_over(found, before), of_use, law)

@@ -164,11 +164,10 @@ def find_law(search: Search, *, instead: bool = True, moves_out: bool = False) -
         return None  # one path takes any law, and no other recording could bear it out
     unstated = [q for candidate in stand_ins(recordings) for q in parameters_of(candidate)]
     own = [*search.own, *unstated]
-    base = (
-        best
-        if not best.hypothesis.candidates and not unstated
-        else continuous_fit(relaxed_fit, Hypothesis(), own, noise, {}, iterations=6, polish=1)
-    )
+    base = search.base if best.hypothesis.candidates else best
+    if unstated or any(candidate.fixed_values for candidate in best.hypothesis.candidates):
+        # where samples were lost, the baseline's fit is that of others
+        base = continuous_fit(relaxed_fit, Hypothesis(), own, noise, {}, iterations=6, polish=1)
     own_at = _own_at(relaxed_fit, own)
     start = _beside(relaxed_fit, own, own_at, noise)
     states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
@@ -185,6 +184,10 @@ def find_law(search: Search, *, instead: bool = True, moves_out: bool = False) -
     places = plant.laws.places(states)
     # where a wind blows shows in what it does to all of a path after it, which jumps between segments would take up
     widths = _best_of_widths(candidate_laws(replace(base.fit, noise=start.noise), own, places, at)) if places else []
+    if moves_out:
+        # the motion is as all others tell it; there its segments are joined already, which short steps end beside
+        own_at = base.fit.at
+        start = replace(start, trajectories=base.fit.trajectories, at=own_at, linears=())
     found = _likeliest(start, own, own_at, base, [*_spread(ranked), *widths], at)
     if found is None:
         return None
