@@ -3,7 +3,8 @@
 Numba's own on-disk cache looks only at the file in which a function stands, so an edit to an
 effect would leave the compiled engines that call it stale. Here the cache folder's name holds a
 digest of the sources (of estimators/ and validation/, which the engines are not built on, only those that
-compile), so any edit that matters starts a fresh one, and a read-only installation works too.
+compile), so any edit that matters starts a fresh one, and a read-only installation works too. In it code lies
+by the name of its module, so that it serves the same sources wherever they are installed.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numba.core.caching
 import numba.core.config
 
 __all__ = [
@@ -31,6 +34,9 @@ __all__ = [
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+#: numba's own choice of a folder; an older numba asks for no other one
+_Locator: Any = getattr(numba.core.caching, "UserProvidedCacheLocator", object)
 
 
 def _load_without_blas() -> None:
@@ -54,6 +60,23 @@ def _load_without_blas() -> None:
 
 
 _load_without_blas()
+
+
+class KeptByModule(_Locator):  # type: ignore[misc]
+    """Where numba keeps what it compiles of a function: by its module's name for ours, by its file's place for others.
+
+    Numba asks it for the function's folder; what it is to be compiled of it knows by the digest of its file.
+    """
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        super().__init__(function, file)
+        module = function.__module__
+        ours = module.partition(".")[0] == __name__.partition(".")[0]
+        self._folder = str(_cache_folder() / module) if ours else super().get_cache_path()
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return self._folder
 
 
 @cache
@@ -115,31 +138,39 @@ def inlined(function: F) -> F:
 _C_FUNCTIONS: list[Any] = []
 
 
+@contextmanager
+def _kept() -> Iterator[None]:
+    """Have numba keep in our folder what it is told to compile inside the block, and leave numba as it was."""
+    config: Any = numba.core.config
+    ours = {"CACHE_DIR": str(_cache_folder())}
+    if hasattr(config, "CACHE_LOCATOR_CLASSES") and _Locator is not object:
+        # where that folder cannot be written to, numba's others
+        ours["CACHE_LOCATOR_CLASSES"] = f"{__name__}.{KeptByModule.__name__},InTreeCacheLocator,UserWideCacheLocator"
+    before = {name: getattr(config, name) for name in ours}
+    try:
+        for name, value in ours.items():
+            setattr(config, name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(config, name, value)
+
+
 def compiled_address(function: Callable[..., Any], signature: str) -> int:
     """Return the address of ``function``, compiled at once as a C function of a signature such as "void(intp)"."""
-    config: Any = numba.core.config
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(_cache_folder())
-    try:
+    with _kept():
         try:
             _C_FUNCTIONS.append(numba.cfunc(signature, cache=True, error_model="numpy")(function))
         except RuntimeError:  # nowhere to write a cache
             _C_FUNCTIONS.append(numba.cfunc(signature, error_model="numpy")(function))
-    finally:
-        config.CACHE_DIR = before
     return int(_C_FUNCTIONS[-1].address)
 
 
 def _compile(function: F, nogil: bool = False, forceinline: bool = False, reorder: bool = False) -> F:
-    config: Any = numba.core.config
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(_cache_folder())
     how: dict[str, Any] = {"error_model": "numpy", "nogil": nogil, "forceinline": forceinline, "_nrt": not forceinline}
     how["fastmath"] = {"reassoc", "nsz", "contract"} if reorder else False
-    try:
+    with _kept():
         try:
             return cast(F, numba.njit(cache=True, **how)(function))
         except RuntimeError:  # nowhere to write a cache: compile anew in each process
             return cast(F, numba.njit(**how)(function))
-    finally:
-        config.CACHE_DIR = before

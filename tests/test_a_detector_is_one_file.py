@@ -1,13 +1,12 @@
-"""A detector is one file and one line: the diff of docs/architecture.md, applied to a copy, is all that it takes."""
+"""A detector is one file and one line: the diff of docs/architecture.md is all that it takes."""
 
 from __future__ import annotations
 
 import pytest
-from support.page_diff import told_by_a_copy
+from support.page_diff import told_with_diff
 
 ASKED = """
 import json, sys
-sys.path.insert(0, sys.argv[1] + "/tests")
 from dataclasses import replace
 import numpy as np
 from discsim.disc import Rig
@@ -39,8 +38,8 @@ print("TOLD" + json.dumps(told))
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
-    """What a copy of the program says of three run-downs, in one of which the gyroscope's bias steps."""
-    return told_by_a_copy("A detector", tmp_path_factory.mktemp("detector"), ASKED)
+    """What the program with it says of three run-downs, in one of which the gyroscope's bias steps."""
+    return told_with_diff("A detector", tmp_path_factory.mktemp("detector"), ASKED)
 
 
 def test_the_detector_of_the_page_finds_what_it_is_for(told):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from support.page_diff import told_by_a_copy
+from support.page_diff import told_with_diff
 
 ASKED = """
 import json, sys
@@ -44,8 +44,8 @@ print("TOLD" + json.dumps(told))
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
-    """What a copy of the program says of a throw with the page's barometer on board."""
-    return told_by_a_copy("A sensor", tmp_path_factory.mktemp("sensor"), ASKED)
+    """What the program with it says of a throw with the page's barometer on board."""
+    return told_with_diff("A sensor", tmp_path_factory.mktemp("sensor"), ASKED)
 
 
 def test_the_sensor_of_the_page_is_flown_written_and_read_again(told):

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import ast
-import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from support.page_diff import told_with
 
 from discsim.effects import CATALOGUE
 
@@ -73,23 +70,9 @@ def test_an_effect_becomes_another_by_a_parameter_whose_spread_is_known():
 
 # ------------------------------------------------------------------------------ a file that is put beside the others
 
-#: lets modules of a folder be found as if they stood in discsim/effects, before anything of ours is imported
-BESIDE = """
-import sys
-from importlib.machinery import PathFinder
-from pathlib import Path
-
-found = PathFinder.find_spec
-def widened(name, path=None, target=None):
-    spec = found(name, path, target)
-    if name == "discsim.effects":
-        spec.submodule_search_locations.append(sys.argv[1])
-    return spec
-PathFinder.find_spec = widened
-"""
-
 ASKED = """
-import json, runpy
+import json, runpy, sys
+from pathlib import Path
 from dataclasses import replace
 import numpy as np
 from discsim import engine
@@ -163,17 +146,9 @@ def told(tmp_path_factory):
     """What the program says of the page's two effects, in a process of its own whose catalogue has their file."""
     folder = tmp_path_factory.mktemp("effects")
     (module,) = re.findall(r"^```python\n(\"\"\".*?ROWS = .*?)^```", PAGE, re.MULTILINE | re.DOTALL)
-    (folder / "flutter_rows.py").write_text(module, encoding="utf-8")
-    answer = subprocess.run(
-        [sys.executable, "-c", BESIDE + ASKED, str(folder), str(ROOT / "docs" / "effects.py")],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
-    assert answer.returncode == 0, answer.stdout[-500:] + answer.stderr[-2000:]
-    return json.loads(answer.stdout.partition("TOLD")[2])
+    (folder / "discsim" / "effects").mkdir(parents=True)
+    (folder / "discsim" / "effects" / "flutter_rows.py").write_text(module, encoding="utf-8")
+    return told_with(folder, ASKED, str(ROOT / "docs" / "effects.py"))
 
 
 BOTH = ["air.rim_damping", "gyro.bending"]

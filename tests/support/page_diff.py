@@ -1,11 +1,10 @@
-"""Diffs that a page of the docs shows, applied to a copy of the program, and what that copy says."""
+"""Diffs that a page of the docs shows, and what the program says with the files that they make."""
 
 from __future__ import annotations
 
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -23,17 +22,37 @@ def diff_of(heading: str) -> str:
     return diff
 
 
+#: has modules of the folder that a program is given first take the place of ours, before anything of ours is imported
+BESIDE = """
+import sys
+from importlib.machinery import PathFinder
+from pathlib import Path
+
+_find_spec = PathFinder.find_spec
+def widened(name, path=None, target=None):
+    spec = _find_spec(name, path, target)
+    if name.partition(".")[0] == "discsim" and spec is not None and spec.submodule_search_locations:
+        linked = name.startswith(("discsim.estimators", "discsim.validation"))
+        place = Path(sys.argv[1], *name.split(".")[linked:])
+        if place.is_dir():
+            spec.submodule_search_locations.insert(0, str(place))
+    return spec
+PathFinder.find_spec = widened
+"""
+
+
 def applied(diff: str, folder: Path) -> None:
-    """Apply a diff of new files and of hunks whose old lines stand once in their file."""
+    """Write into a folder what a diff of new files and of hunks, whose old lines stand once in their file, makes."""
     for part in re.split(r"(?m)^--- ", diff)[1:]:
         target = re.search(r"^\+\+\+ b/(.*)$", part, re.MULTILINE)
         assert target is not None
         path = folder / target[1]
+        path.parent.mkdir(parents=True, exist_ok=True)
         hunks = re.split(r"(?m)^@@.*\n", part.split("\n", 2)[2])
         if part.startswith("/dev/null"):
             path.write_text("".join(line[1:] + "\n" for line in hunks[0].splitlines()), encoding="utf-8")
             continue
-        text = path.read_text(encoding="utf-8")
+        text = (ROOT / target[1]).read_text(encoding="utf-8")
         for hunk in hunks[1:]:
             lines = hunk.splitlines()
             before = "\n".join(line[1:] for line in lines if not line.startswith("+"))
@@ -43,23 +62,25 @@ def applied(diff: str, folder: Path) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def told_by_a_copy(heading: str, folder: Path, asked: str, *, compiled: bool = True) -> dict[str, Any]:
-    """Return what a program prints as JSON behind ``TOLD``, run in a copy to which a section's diff was applied.
+def told_with(folder: Path, asked: str, *given: str) -> dict[str, Any]:
+    """Return what a program prints as JSON behind ``TOLD``, with the modules of a folder in the place of ours.
 
-    The program gets the folder of the copy as its argument. Where it computes little, compiling takes longer than all
-    of it without being ``compiled``.
+    It gets the folder as its first argument. What was compiled of ours serves it, too: none of these changes it.
     """
-    for package in ("discsim", "estimators", "validation", "models"):
-        shutil.copytree(ROOT / package, folder / package, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
-    applied(diff_of(heading), folder)
     answer = subprocess.run(
-        [sys.executable, "-c", asked, str(folder)],
+        [sys.executable, "-c", BESIDE + asked, str(folder), *given],
         capture_output=True,
         text=True,
         check=False,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": str(int(not compiled))},
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     assert answer.returncode == 0, answer.stdout[-500:] + answer.stderr[-2000:]
     found: dict[str, Any] = json.loads(answer.stdout.partition("TOLD")[2])
     return found
+
+
+def told_with_diff(heading: str, folder: Path, asked: str) -> dict[str, Any]:
+    """Return what a program says, as of `told_with`, to which the diff of a section was applied."""
+    applied(diff_of(heading), folder)
+    return told_with(folder, asked)
