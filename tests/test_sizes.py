@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -45,16 +46,19 @@ def sources() -> Iterator[tuple[str, str]]:
             yield path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
 
 
-def functions(text: str) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """Yield the functions of a text that are no compiled kernels, and nothing inside of those."""
+@cache
+def functions(text: str) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """Return the functions of a text that are no compiled kernels, and nothing inside of those."""
+    found: list[ast.FunctionDef | ast.AsyncFunctionDef] = []
     ahead: list[ast.AST] = [ast.parse(text)]
     while ahead:
         for node in ast.iter_child_nodes(ahead.pop()):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 if any(ast.unparse(each).startswith(COMPILED) for each in node.decorator_list):
                     continue
-                yield node
+                found.append(node)
             ahead.append(node)
+    return found
 
 
 def length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

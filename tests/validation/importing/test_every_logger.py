@@ -166,7 +166,7 @@ def test_without_a_field_diagnose_says_what_to_add(name, answers, tmp_path):
 @pytest.mark.parametrize(
     "name",
     [
-        name if name in ("flatball", "phyphox") else pytest.param(name, marks=pytest.mark.slow)
+        name if name == "phyphox" else pytest.param(name, marks=pytest.mark.slow)
         for name in ROTATING
         if name != "cats_imu1"
     ],

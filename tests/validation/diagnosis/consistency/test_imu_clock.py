@@ -54,7 +54,7 @@ def test_a_chip_that_is_read_in_step_has_no_clock_of_its_own(seed):
     assert "imu.own_clock" not in named
 
 
-@pytest.mark.parametrize("seed", [1, 11])
+@pytest.mark.parametrize("seed", [1, pytest.param(11, marks=pytest.mark.slow)])
 def test_rows_that_are_read_in_step_stand_behind_the_samples_that_they_show_by_their_true_ages(seed):
     made, clock = counted(seed, None)
     found = imu_clock_of(made, NAMES, clock)
