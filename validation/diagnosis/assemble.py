@@ -15,6 +15,7 @@ from discsim.effects.catalogue import effect as catalogued
 from discsim.effects.rig import AxisTilt
 from discsim.model_file import Model, ModelEffect
 from discsim.recording import Recording
+from discsim.validation.diagnosis.answer.misstated import sentence
 from discsim.validation.diagnosis.command_followed import not_as_commanded
 from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
@@ -58,11 +59,12 @@ from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_se
 from discsim.validation.diagnosis.stages import Judged, Question
 from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw
-from discsim.validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
+from discsim.validation.diagnosis.verdict import recalibrations, standard_errors
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, chi_squared
 from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.stated_parameters import STATED_NAMES
 
 __all__ = ["outcome_of", "reason_for"]
 
@@ -312,7 +314,7 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
         disc = replace(disc, aero=disc.aero._replace(**aero), sigma=sigma, **fields)  # type: ignore[arg-type]
     if rig is not None:
         fields = {name: values["rig", name][0] for name in ("Izz", "viscous") if ("rig", name) in values}
-        keys = {name: RECALIBRATED_NAMES["rig", name] for name in fields}
+        keys = {name: STATED_NAMES["rig", name] for name in fields}
         rig = replace(rig, **fields, sigma={**rig.sigma, **{keys[n]: values["rig", n][1] for n in fields}})
     if ("environment", "air_density") in values:
         environment = replace(environment, air_density=values["environment", "air_density"][0])
@@ -400,10 +402,21 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
         told = () if turning is None else turning.sentences
         told += not_as_commanded(found, question.names) if judged.verdict == "unexplained" else _leaning(found)
         told += _out_of_balance(found)
-        return _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
-    assert tried.contradiction is not None
-    datasets, names, seed = question.datasets, question.names, question.seed
-    return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
+        outcome = _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
+    else:
+        assert tried.contradiction is not None
+        contradiction, (datasets, names, seed) = tried.contradiction, (question.datasets, question.names, question.seed)
+        outcome = contradicted_outcome(contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
+    return _with_misstated(outcome, judged)
+
+
+def _with_misstated(outcome: Outcome, judged: Judged) -> Outcome:
+    """Return an outcome that says first which stated numbers would explain all were they others."""
+    diagnosis, numbers = outcome.diagnosis, judged.misstated
+    if not numbers:
+        return outcome
+    told = [sentence(some, instead=diagnosis.verdict != "unexplained") for some in numbers]
+    return replace(outcome, diagnosis=replace(diagnosis, warnings=(*told, *diagnosis.warnings), misstated=numbers))
 
 
 def _leans_unseen(found: Search, candidate: CandidateEffect) -> bool:

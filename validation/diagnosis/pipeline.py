@@ -20,6 +20,7 @@ from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.datasets import recording_names, recordings_of
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
+from discsim.validation.diagnosis.misstated import reconciling
 from discsim.validation.diagnosis.prepared import prepared
 from discsim.validation.diagnosis.progress import Progress, silent
 from discsim.validation.diagnosis.refuted import without_refuted
@@ -80,7 +81,7 @@ def diagnose(
             if supposed is not None:
                 again = tried_under(supposed, question)
                 tried = again if stands(again) else tried
-        tried = _with_law_of_one(tried, question)
+        tried = _with_numbers(_with_law_of_one(tried, question), question)
         if tried.found is not None and tried.law is None:
             tried = replace(tried, found=with_instants_weighed(without_refuted(tried.found)))
         return outcome_of(judged(tried, progress), question)
@@ -107,6 +108,17 @@ def _with_law_of_one(tried: Tried, question: Question) -> Tried:
     if law is None or law.law.target.partition(".")[0] not in contradiction.against:
         return tried
     return Tried(ready, None, begun, law) if law.explains_all else tried
+
+
+def _with_numbers(tried: Tried, question: Question) -> Tried:
+    """Return what was tried with the stated numbers under which sensors would not contradict one another."""
+    ready = tried.prepared
+    if tried.contradiction is None or "gyroscope" not in tried.contradiction.blamed or ready.rows is not None:
+        return tried
+    free = free_parameters(ready.setup)
+    problem = SearchProblem(ready.fitted, as_stated=ready.meant, free=free, effects=question.effects)
+    numbers = reconciling(problem, lambda found: not leaves_more_than_noise(found))
+    return replace(tried, misstated=(numbers,)) if numbers else tried
 
 
 def _prepared_first(question: Question) -> Prepared:

@@ -18,6 +18,7 @@ from discsim.recording import PLANTS, Plant
 from discsim.validation.diagnosis.answer.checked import Recordings, finite, plain, shared
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.answer.measured import FitFigures, HeldOut, Located, NoiseNote, Outlier
+from discsim.validation.diagnosis.answer.misstated import Misstated
 from discsim.validation.diagnosis.answer.named import (
     MOVE_LIMIT,
     SMALLEST_P_VALUE,
@@ -92,6 +93,8 @@ class Diagnosis:
         Effects that explain an unexplained mismatch in part, on every recording set aside.
     leftovers : tuple of Leftover
         What each recording keeps of each sensor with the others' numbers, where rows had to be counted.
+    misstated : tuple of tuple of Misstated
+        Sets of numbers that are stated as exact; were those of one set others, they would explain all.
     agreement : Agreement or None
         Which sensors agree about the spin, and what single causes reconcile them; None where none can be compared.
     """
@@ -114,6 +117,7 @@ class Diagnosis:
     agreement: Agreement | None = None
     partly: tuple[PartlyExplained, ...] = ()
     leftovers: tuple[Leftover, ...] = ()
+    misstated: tuple[tuple[Misstated, ...], ...] = ()
 
     def __post_init__(self) -> None:
         if not self.datasets:
@@ -156,6 +160,7 @@ class Diagnosis:
             "effects": _list(self.effects),
             "recalibrated": {name: item.to_json() for name, item in self.recalibrated.items()},
             "partly_explained": _list(self.partly),
+            "misstated": [_list(numbers) for numbers in self.misstated],
             "law": None if self.law is None else self.law.to_json(),
             "noise": _list(self.noise),
             "fit": {"baseline": self.baseline.to_json(), "final": self.final.to_json()},

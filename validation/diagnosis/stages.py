@@ -9,6 +9,7 @@ from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.leftover import Leftover
+from discsim.validation.diagnosis.answer.misstated import Misstated
 from discsim.validation.diagnosis.consistency.early_verdict import Contradiction
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, Comparison
 from discsim.validation.diagnosis.detectors.row_times import RowTimes
@@ -70,13 +71,15 @@ class Prepared:
 class Tried:
     """A setup put to the proof: either sensors contradict one another under it, or effects were searched.
 
-    ``law`` is that by which one sensor alone contradicts all others.
+    ``law`` is that by which one sensor alone contradicts all others. ``misstated`` are sets of numbers that are stated
+    as exact; were those of one set others, sensors would not contradict one another.
     """
 
     prepared: Prepared
     contradiction: Contradiction | None = None
     found: Search | None = None
     law: FoundLaw | None = None
+    misstated: tuple[tuple[Misstated, ...], ...] = ()
 
     @property
     def fit(self) -> Fit | None:
@@ -89,6 +92,7 @@ class Judged:
     """What was tried, with its verdict; a ``law`` stands for all that was left out.
 
     ``left`` is what each recording keeps of each sensor, where rows had to be counted, by the fits ``set_aside``.
+    ``misstated`` are sets of numbers that are stated as exact; were those of one set others, they would explain all.
     """
 
     tried: Tried
@@ -96,3 +100,4 @@ class Judged:
     law: FoundLaw | None = None
     left: tuple[Leftover, ...] = ()
     set_aside: tuple[Fit, ...] = ()
+    misstated: tuple[tuple[Misstated, ...], ...] = ()

@@ -11,7 +11,9 @@ from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.kind import BOARD
 from discsim.validation.diagnosis.answer.leftover import Leftover
+from discsim.validation.diagnosis.answer.misstated import Misstated
 from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
+from discsim.validation.diagnosis.misstated import misstated
 from discsim.validation.diagnosis.progress import Progress
 from discsim.validation.diagnosis.result import (
     Recalibration,
@@ -24,9 +26,9 @@ from discsim.validation.diagnosis.stages import Judged, Tried
 from discsim.validation.diagnosis.unknown_law.find import find_law, left_to_gain
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual
+from discsim.validation.identification.stated_parameters import STATED_NAMES
 
 __all__ = [
-    "RECALIBRATED_NAMES",
     "judged",
     "leaves_more_than_noise",
     "may_be_the_air",
@@ -37,17 +39,6 @@ __all__ = [
 
 #: axes of a gyroscope on which a wobble shows
 _TRANSVERSE = ("x_rad_s", "y_rad_s")
-
-RECALIBRATED_NAMES = {
-    ("disc", "mass"): "mass_kg",
-    ("disc", "d"): "diameter_m",
-    ("disc", "Ixx"): "Ixx_kg_m2",
-    ("disc", "Izz"): "Izz_kg_m2",
-    ("rig", "Izz"): "Izz_kg_m2",
-    ("rig", "viscous"): "viscous_N_m_s",
-    ("environment", "air_density"): "air_density_kg_m3",
-    ("environment", "gravity"): "gravity_m_s2",
-}
 
 
 def judged(tried: Tried, progress: Progress) -> Judged:
@@ -60,7 +51,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     """
     found, law = tried.found, None
     if found is None or tried.law is not None:
-        return Judged(tried, "unexplained", tried.law)
+        return Judged(tried, "unexplained", tried.law, misstated=tried.misstated)
     rows, agreement = tried.prepared.rows, tried.prepared.agreement
     set_aside: tuple[Fit, ...] = ()
     leftovers: tuple[Leftover, ...] = ()
@@ -68,7 +59,8 @@ def judged(tried: Tried, progress: Progress) -> Judged:
         set_aside = tuple(heldout_fits(found.final))
         leftovers = leftovers_of(found, set_aside, rows.names, agreement)
     left = leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
-    if left or _may_be_a_copy(found):
+    numbers = _misstated(found, left=left, progress=progress)
+    if not numbers and (left or _may_be_a_copy(found)):
         progress("looking for a law", 4, 5)
         law = find_law(found, instead=not left)
     verdict: Verdict
@@ -79,7 +71,26 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     else:
         moved = any(item.beyond for item in recalibrations(found).values())
         verdict = "recalibrated" if moved else "consistent"
-    return Judged(tried, verdict, law, leftovers, set_aside)
+    return Judged(tried, verdict, law, leftovers, set_aside, numbers)
+
+
+def _misstated(found: Search, *, left: bool, progress: Progress) -> tuple[tuple[Misstated, ...], ...]:
+    """Return sets of stated numbers of which each explains all where more than noise is ``left``, were they others.
+
+    In flights effects on the motion may stand for one: beside a mass that is 2 % off, drag and a stall. There one
+    number is told that does better than they do for what it costs.
+    """
+    lasting = [c for c in found.final.hypothesis.candidates if c.row.acts_on == "motion" and not c.row.brief]
+    if not left and not (found.relaxed_fit.plant.air_modelled and lasting):
+        return ()
+    progress("asking what is stated", 4, 5)
+    bar = np.inf if left else found.final.score + found.final.charged - SELECTION.rival
+    cost = SELECTION.entry + SELECTION.per_parameter
+
+    def explains(other: Search) -> bool:
+        return other.final.score + cost < bar and not leaves_more_than_noise(other)
+
+    return tuple(numbers for numbers in misstated(found, explains) if left or len(numbers) == 1)
 
 
 def leaves_more_than_noise(found: Search) -> bool:
@@ -141,7 +152,7 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
         if q.group == "disc" and found.recordings[0].disc is None:
             continue  # it stands for a ratio that nobody stated
         sigma = next(p.sigma for p in found.own if q.key == p.key and q.recordings == p.recordings)
-        name = aero_key(q.name) if q.group == "aero" else RECALIBRATED_NAMES.get(q.key, f"{q.group}.{q.name}")
+        name = aero_key(q.name) if q.group == "aero" else STATED_NAMES.get(q.key, f"{q.group}.{q.name}")
         if q.recordings is not None:
             name = f"{name} ({','.join(str(i + 1) for i in sorted(q.recordings))})"
         result[name] = Recalibration(q.stated, sigma, float(value), float(error))

@@ -15,10 +15,17 @@ from discsim.recording import Recording
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import plant_of
 
-__all__ = ["stated_parameters"]
+__all__ = ["STATED_NAMES", "exact_numbers", "stated_parameters"]
 
 _DISC = {"mass_kg": "mass", "diameter_m": "d", "Ixx_kg_m2": "Ixx", "Izz_kg_m2": "Izz"}
 _RIG = {"Izz_kg_m2": "Izz", "viscous_N_m_s": "viscous"}
+#: the name in a recording of each stated number of the hardware and the surroundings, by its place among parameters
+STATED_NAMES = {
+    **{("disc", place): name for name, place in _DISC.items()},
+    **{("rig", place): name for name, place in _RIG.items()},
+    ("environment", "air_density"): "air_density_kg_m3",
+    ("environment", "gravity"): "gravity_m_s2",
+}
 
 
 def stated_parameters(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
@@ -40,6 +47,28 @@ def stated_parameters(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
             recordings_of = None if len(where) == len(recordings) else where
             parameters.append(Parameter(group, name, stated, 0.02 * sigma, sigma, recordings_of))
     return tuple(parameters)
+
+
+def exact_numbers(recordings: Sequence[Recording]) -> dict[tuple[str, str], float]:
+    """Return the sizes of the hardware that all recordings state alike and without an uncertainty, those that show.
+
+    Of a body that nothing but its own inertia turns, or a rig, the ratio of two shows, so that one of them is enough.
+    """
+    first = recordings[0]
+    plant, disc, rig = plant_of(first), first.disc, first.rig
+    found: dict[tuple[str, str], float] = {}
+    if disc is not None and "disc" in plant.hardware:
+        names = _DISC if plant.air_modelled else {"Ixx_kg_m2": "Ixx"}
+        sizes = {place: disc.diameter if place == "d" else getattr(disc, place) for place in names.values()}
+        found |= {
+            ("disc", place): float(size)
+            for place, size in sizes.items()
+            if STATED_NAMES["disc", place] not in disc.sigma
+        }
+    if rig is not None and "rig" in plant.hardware and "viscous_N_m_s" not in rig.sigma:
+        found["rig", "viscous"] = float(rig.viscous)
+    alike = all((one.disc, one.rig) == (disc, rig) for one in recordings)
+    return {key: size for key, size in found.items() if size > 0.0} if alike else {}
 
 
 def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:

@@ -13,6 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from discsim.recording import SENSORS
+from discsim.validation.diagnosis.answer.misstated import in_short
 from discsim.validation.diagnosis.report.consistency_tables import leftovers_of, tables_of
 from discsim.validation.diagnosis.report.figures import draw_overview, draw_sensor, readable_axis, sensors_of
 from discsim.validation.diagnosis.report.wording import (
@@ -140,6 +141,9 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
         text = _joined([f"{name} moves from {item.stated:.4g} to {item.value:.4g}" for name, item in moved])
         return f"The baseline's physics explains these recordings once {text}.".replace("-", "−")
     if diagnosis.verdict == "unexplained":
+        if diagnosis.misstated:
+            others = ", or ".join(in_short(numbers) for numbers in diagnosis.misstated)
+            return f"A stated number may be wrong: {others} would leave nothing but noise."
         text = "Something is missing that no effect of the catalogue accounts for"
         if diagnosis.partly:
             lead = _joined([name_of(item.id) for item in diagnosis.partly])
