@@ -38,13 +38,14 @@ def mended_flights(
 
 
 def reading_doubts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Return what is doubtful about positions and failed readings of recordings (called ``names``), as `check` says it.
+    """Return what is doubtful about stated numbers, positions and failed readings of recordings, as `check` says it.
 
-    A line each. Seconds are what their clock's unit makes of the times: in another unit every path looks wrong.
+    A line each, with the ``names`` of those recordings that it is about. Seconds are what their clock's unit makes of
+    the times: in another unit every path looks wrong.
     """
     unit = clock_unit(recordings)
     meant = [corrected(one, [] if unit is None else [unit]) for one in recordings]
-    found = [(*failed_findings(one), *path_findings(one)) for one in meant]
+    found = [(*statement_findings(one), *failed_findings(one), *path_findings(one)) for one in meant]
     return tuple(_told_once([doubts_of(own) for own in found], names))
 
 

@@ -100,6 +100,14 @@ def test_a_diagnosis_says_of_a_path_what_a_check_says_once_for_all_recordings(th
     assert reading_doubts(throws, ["a", "b"]) == ()
 
 
+def test_a_diagnosis_says_of_a_stated_number_what_a_check_says(throws):
+    """A mass in grams came out as physics that no effect accounts for, without a word of it."""
+    heavy = [replace(one, disc=replace(DISC, mass=179.0)) for one in throws]
+    (said,) = reading_doubts(heavy, ["a", "b"])
+    assert said == "[disc]: mass_kg is 179; expected 0.08 to 0.22 kg; that is a disc in grams: write 0.179"
+    assert reading_doubts([throws[0], heavy[1]], ["a", "b"]) == (f"b: {said}",)
+
+
 def test_what_a_path_is_doubted_for_is_among_the_warnings_of_a_diagnosis(throws):
     short = {name: throws[0].need(name).between(0.0, 2.0) for name in ("gyroscope", "gps")}
     wrong = [with_path(replace(throws[0], samples=short), scaled(POSITION, 1 / 0.3048))]
