@@ -54,21 +54,21 @@ def exact_numbers(recordings: Sequence[Recording]) -> dict[tuple[str, str], floa
 
     Of a body that nothing but its own inertia turns, or a rig, the ratio of two shows, so that one of them is enough.
     """
-    first = recordings[0]
-    plant, disc, rig = plant_of(first), first.disc, first.rig
+    first, *others = map(_exact, recordings)
+    return first if all(one == first for one in others) else {}
+
+
+def _exact(recording: Recording) -> dict[tuple[str, str], float]:
+    """Return the sizes of a recording's hardware that it states without an uncertainty, by their places."""
+    plant, disc, rig = plant_of(recording), recording.disc, recording.rig
     found: dict[tuple[str, str], float] = {}
     if disc is not None and "disc" in plant.hardware:
         names = _DISC if plant.air_modelled else {"Ixx_kg_m2": "Ixx"}
-        sizes = {place: disc.diameter if place == "d" else getattr(disc, place) for place in names.values()}
-        found |= {
-            ("disc", place): float(size)
-            for place, size in sizes.items()
-            if STATED_NAMES["disc", place] not in disc.sigma
-        }
+        sizes = {name: disc.diameter if place == "d" else getattr(disc, place) for name, place in names.items()}
+        found |= {("disc", names[name]): float(size) for name, size in sizes.items() if name not in disc.sigma}
     if rig is not None and "rig" in plant.hardware and "viscous_N_m_s" not in rig.sigma:
         found["rig", "viscous"] = float(rig.viscous)
-    alike = all((one.disc, one.rig) == (disc, rig) for one in recordings)
-    return {key: size for key, size in found.items() if size > 0.0} if alike else {}
+    return {key: size for key, size in found.items() if size > 0.0}
 
 
 def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:

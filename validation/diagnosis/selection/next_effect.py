@@ -106,12 +106,13 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     return replace(found, cost=found.cost + cost), best
 
 
-def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
+def next_two(found: Search, alone: ContinuousFit | None = None) -> tuple[Search, ContinuousFit | None]:
     """Return the fit with the best two effects where it comes near the data, else None.
 
     Far from the data each of two effects alone may be fitted with numbers that serve for both. A third may do better
     than either. Algebra about the fit that follows the data tells both at once, but a delay and a lag alike: pairs are
-    refitted until one leaves nothing but noise.
+    refitted until one leaves nothing but noise. Lost samples are counted and stand in no algebra: they are tried beside
+    the effect that is best ``alone``, lest a clock stands for them.
     """
     base, noise = found.base, found.relaxed_noise
     ranked = pairs(found.relaxed_equations, found.candidates, found.own)
@@ -139,7 +140,33 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
         best = both if best is None or both.worse_than(best) < 0.0 else best
         if not both.unmodelled():
             break
-    return found, best
+    return (found, best) if alone is None else _beside_losses(found, alone, best)
+
+
+def _beside_losses(
+    found: Search, alone: ContinuousFit, best: ContinuousFit | None
+) -> tuple[Search, ContinuousFit | None]:
+    """Return the ``best`` fit of two effects, or one of lost samples beside the effect that is best ``alone``."""
+    chosen: Shifted | None = None
+    for item in found.lost_samples.found:
+        if item.screened.candidate.id in {candidate.id for candidate in alone.hypothesis.candidates}:
+            continue
+        both = continuous_fit(
+            item.in_place_of(found.relaxed_fit),
+            alone.hypothesis.plus(item.screened.candidate),
+            found.own,
+            found.relaxed_noise,
+            {**values_of_fit(alone), **item.screened.start},
+            bars=Bars(SELECTION.hopeless * SELECTION.far * found.base.fit.count),
+        )
+        both = found.with_cost(both, item.cost)
+        worth = found.base.score - both.score > sum(map(price, both.hypothesis.candidates))
+        if worth and possible(both) and not far(found, both) and (best is None or both.worse_than(best) < 0.0):
+            best, chosen = both, item
+    if chosen is None:
+        return found, best
+    relaxed_fit = chosen.in_place_of(found.relaxed_fit)
+    return replace(found, relaxed_fit=relaxed_fit, cost=found.cost + chosen.cost), best
 
 
 def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, list[Offer]]:

@@ -135,7 +135,7 @@ def _selected_forward(found: Search, of_use: int | None, law: Callable[[Search],
             and not _told(better)
             and _most(found, current, most) > 1
         ):
-            found, both = next_two(found)
+            found, both = next_two(found, better)
             if both is not None:
                 found = _with_final(found, eliminated_backward(found, both))
                 continue

@@ -7,9 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.made import throws
+from support.made import FIELD, throws
 
 from discsim.effects import Effect, effect
+from discsim.recording import Samples
+from discsim.rig import turn_table
+from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.design.next_recording import confusions
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
@@ -18,11 +21,13 @@ from discsim.validation.diagnosis.selection.candidates import CandidateEffect, c
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.exchange import exchanged, rivals_of
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.selection.next_effect import next_effect, next_two
 from discsim.validation.diagnosis.selection.offers import in_turn
 from discsim.validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
 from discsim.validation.diagnosis.selection.screening import normal_equations_of
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Rival, Search, possible
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.identification.noise import estimate_noise
 from discsim.validation.identification.plants.flight import FLIGHT
@@ -191,3 +196,27 @@ def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():
     ]
     gains = [offer[0].gain for offer in in_turn(there, here)]
     assert gains == [1e6, 1e4, 9e5, 5e3]
+
+
+def test_lost_samples_are_tried_beside_the_best_effect_before_a_clock_stands_for_them():
+    """On tables, a place of the accelerometer beside lost samples of the magnetometer were a clock and more."""
+    turns = (
+        Samples(np.array([0.0, 0.5, 2.0, 4.0, 5.0, 8.0]), np.array([0.0, 0.0, 30.0, 30.0, 55.0, 55.0])),
+        Samples(np.array([0.0, 1.0, 3.0, 5.0, 6.5, 8.0]), np.array([20.0, 20.0, -40.0, -40.0, 10.0, 10.0])),
+    )
+    errors = [effect("accel.position_offset", dx_m=0.002, dy_m=-0.0016), effect("mag.dropped_samples", fraction=0.01)]
+    made = []
+    for k, turn in enumerate(turns):
+        module = Instruments.from_parts("mpu9250").with_effects(errors)
+        motion = turn_table(turn, FIELD, (), yaw=0.3 + k)
+        rng = np.random.default_rng(20 + k)
+        made.append(record(motion, module, rng, plant="rate_table", name=f"table-{k}", command=turn))
+    begun = screened(SearchProblem(made))
+    found, alone = next_effect(begun, begun.final, 0)
+    assert alone is not None
+    assert ids_of(alone.hypothesis) == {"accel.position_offset"}
+    found, both = next_two(found, alone)
+    assert both is not None
+    assert ids_of(both.hypothesis) == {one.id for one in errors}
+    assert found.cost > begun.cost
+    assert "magnetometer" in found.relaxed_fit.trajectories[0].lost
