@@ -60,7 +60,7 @@ def reconciling(problem: SearchProblem, explains: Callable[[Search], bool]) -> t
     A wrong ratio of the two has a disc wobble at another rate than its gyroscope shows, by radians within a segment, so
     that no step leads to the right one: those of discs are tried.
     """
-    numbers = {key: size for key, size in exact_numbers(problem.as_stated or problem.recordings).items()}
+    numbers = exact_numbers(problem.as_stated or problem.recordings)
     disc = problem.recordings[0].disc
     if disc is None or ("disc", "Ixx") not in numbers:
         return ()
@@ -75,8 +75,7 @@ def reconciling(problem: SearchProblem, explains: Callable[[Search], bool]) -> t
                 break
             found = screened(replace(problem, recordings=recordings, free=(*problem.free, free)))
             if explains(found):
-                (one,) = _moved(found.base, [free])
-                return (replace(one, stated=numbers["disc", place]),)
+                return tuple(replace(one, stated=numbers["disc", place]) for one in _moved(found.base, [free]))
     return ()
 
 
@@ -104,10 +103,14 @@ def _explaining(found: Search, free: Sequence[Parameter], explains: Callable[[Se
 
 
 def _moved(fitted: ContinuousFit, free: Sequence[Parameter]) -> tuple[Misstated, ...]:
-    """Return numbers where a fit has them, with their standard errors."""
+    """Return numbers where a fit has them, with their standard errors; none where these are not known."""
     fit = fitted.fit
+    if fit.covariance.shape[0] != len(fit.parameters):
+        return ()
     places = {q.key: k for k, q in enumerate(fit.parameters)}
     some = [places[q.key] for q in free]
-    sd = np.sqrt(np.diag(fit.covariance)[some])
-    pairs = zip(free, fit.at[some].tolist(), sd.tolist(), strict=True)
-    return tuple(Misstated(STATED_NAMES[q.key], q.stated, value, error) for q, value, error in pairs)
+    values, sd = fit.at[some], np.sqrt(np.maximum(np.diag(fit.covariance)[some], 0.0))
+    if not np.all(np.isfinite([values, sd])):
+        return ()
+    triples = zip(free, values.tolist(), sd.tolist(), strict=True)
+    return tuple(Misstated(STATED_NAMES[q.key], q.stated, value, error) for q, value, error in triples)

@@ -91,3 +91,8 @@ def test_numbers_are_told_to_the_digit_that_their_error_leaves():
     )
     assert "are stated as" in sentence([mass, inertia], instead=False)
     assert np.isfinite(mass.to_json()["sd"])
+
+
+def test_a_number_whose_error_is_not_known_is_none():
+    with pytest.raises(ValueError, match="what mass_kg would be: sd is nan"):
+        Misstated("mass_kg", 0.165, 0.179, float("nan"))

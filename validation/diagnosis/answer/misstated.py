@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+
+from discsim.validation.diagnosis.answer.checked import Told, finite
 
 __all__ = ["Misstated", "in_short", "sentence"]
 
 
 @dataclass(frozen=True)
-class Misstated:
+class Misstated(Told):
     """A number of ``recording.toml`` that is stated as exact, and what it would be; units are those of its name."""
 
     name: str
@@ -19,9 +20,8 @@ class Misstated:
     value: float
     sd: float
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain numbers and texts."""
-        return {"name": self.name, "stated": float(self.stated), "value": float(self.value), "sd": float(self.sd)}
+    def __post_init__(self) -> None:
+        finite(f"what {self.name} would be", stated=self.stated, value=self.value, sd=self.sd)
 
 
 def in_short(numbers: Sequence[Misstated]) -> str:

@@ -365,7 +365,12 @@ def _noise(item: NoiseNote) -> tuple[str, str, str, str, str, str]:
 
 
 def _meaning(diagnosis: Diagnosis) -> str:
-    """Return what the verdict means, and what it does not where rows had to be counted."""
+    """Return what the verdict means, and what it does not where rows had to be counted or a stated number is off."""
+    if diagnosis.verdict == "unexplained" and diagnosis.misstated:
+        return (
+            "As stated, a significant mismatch remains, and no effect is named: a number without a sigma is taken as "
+            "exact. With a sigma it may move, and what the recordings then say of it is told with its error."
+        )
     if diagnosis.verdict == "explained" and diagnosis.leftovers:
         return (
             "With this in the model little more is left than pure error: what a motion without any physics leaves of "
