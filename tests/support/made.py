@@ -59,10 +59,12 @@ def throws(
     return made
 
 
-def tables(hidden: Sequence[Effect] = (), errors: Sequence[Effect] = ()) -> list[Recording]:
-    """Return two runs of a rate table, one of them into both directions."""
+def tables(
+    hidden: Sequence[Effect] = (), errors: Sequence[Effect] = (), profiles: Sequence[Samples] = PROFILES
+) -> list[Recording]:
+    """Return two runs of a rate table, one of them into both directions; or a run of each of some ``profiles``."""
     made = []
-    for k, profile in enumerate(PROFILES):
+    for k, profile in enumerate(profiles):
         motion = turn_table(profile, FIELD, hidden, yaw=0.3 + k)
         module, rng = Instruments.from_parts("mpu9250").with_effects(errors), np.random.default_rng(20 + k)
         made.append(record(motion, module, rng, plant="rate_table", name=f"table-{k}", command=profile))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from discsim.recording import Recording
 from discsim.validation.checking.failed_readings import failed_findings
-from discsim.validation.checking.finding import doubts_of
+from discsim.validation.checking.finding import Finding, doubts_of
 from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import statement_findings
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
@@ -25,14 +25,7 @@ def mended_flights(
     """
     setup = find_setup_faults(recordings)
     notes = setup_notes(setup, f"{done} are")
-    found = [
-        [
-            finding
-            for finding in (*statement_findings(one), *failed_findings(one), *path_findings(one))
-            if finding.id not in passed
-        ]
-        for one in setup.recordings
-    ]
+    found = [[finding for finding in _findings(one) if finding.id not in passed] for one in setup.recordings]
     notes += _told_once([doubts_of(own) for own in found], [one.name for one in setup.recordings])
     return tuple(setup.recordings), tuple(notes)
 
@@ -45,8 +38,14 @@ def reading_doubts(recordings: Sequence[Recording], names: Sequence[str]) -> tup
     """
     unit = clock_unit(recordings)
     meant = [corrected(one, [] if unit is None else [unit]) for one in recordings]
-    found = [(*statement_findings(one), *failed_findings(one), *path_findings(one)) for one in meant]
-    return tuple(_told_once([doubts_of(own) for own in found], names))
+    return tuple(_told_once([doubts_of(_findings(one)) for one in meant], names))
+
+
+def _findings(recording: Recording) -> Iterator[Finding]:
+    """Yield what a check finds about stated numbers, failed readings and positions of a recording."""
+    yield from statement_findings(recording)
+    yield from failed_findings(recording)
+    yield from path_findings(recording)
 
 
 def _told_once(sentences: Sequence[Sequence[str]], names: Sequence[str]) -> list[str]:

@@ -49,7 +49,7 @@ from discsim.validation.diagnosis.result import (
 )
 from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, standard_errors
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import tried_without
 from discsim.validation.diagnosis.selection.search_state import Considered, Search, chi2_in
@@ -59,7 +59,7 @@ from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_se
 from discsim.validation.diagnosis.stages import Judged, Question
 from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw
-from discsim.validation.diagnosis.verdict import recalibrations, standard_errors
+from discsim.validation.diagnosis.verdict import recalibrations
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, chi_squared
@@ -405,8 +405,10 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
         outcome = _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
     else:
         assert tried.contradiction is not None
-        contradiction, (datasets, names, seed) = tried.contradiction, (question.datasets, question.names, question.seed)
-        outcome = contradicted_outcome(contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
+        datasets, names, seed = question.datasets, question.names, question.seed
+        outcome = contradicted_outcome(
+            tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning
+        )
     return _with_misstated(outcome, judged)
 
 

@@ -12,10 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.misstated import Misstated
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit, standard_errors
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, hopeless, values_of_fit
@@ -41,7 +40,7 @@ def misstated(found: Search, explains: Callable[[Search], bool]) -> tuple[tuple[
     that moved, and where none did by much, each alone. ``explains`` tells whether a search's final fit leaves nothing
     but noise.
     """
-    every = freed(found.recordings)
+    every = [_free(key, size) for key, size in exact_numbers(found.recordings).items()]
     together = _explaining(found, every, explains) if every else ()
     if len(every) < 2 or not together:
         return (together,) if together else ()
@@ -69,7 +68,7 @@ def reconciling(problem: SearchProblem, explains: Callable[[Search], bool]) -> t
         for place, size in others.items():
             if ("disc", place) not in numbers:
                 continue
-            free = Parameter("disc", place, size, 1e-3 * _WIDTH * size, _WIDTH * size)
+            free = _free(("disc", place), size)
             recordings = [replace(one, disc=replace(disc, **{place: size})) for one in problem.recordings]  # type: ignore[arg-type]
             if contradiction_in(recordings, (*stated_parameters(recordings), *problem.free, free)) is not None:
                 break
@@ -79,10 +78,9 @@ def reconciling(problem: SearchProblem, explains: Callable[[Search], bool]) -> t
     return ()
 
 
-def freed(recordings: Sequence[Recording]) -> list[Parameter]:
-    """Return the numbers of the hardware that recordings state as exact, as parameters that may move."""
-    numbers = exact_numbers(recordings).items()
-    return [Parameter(*key, size, 1e-3 * _WIDTH * size, _WIDTH * size) for key, size in numbers]
+def _free(key: tuple[str, str], size: float) -> Parameter:
+    """Return a number that is stated as exact as a parameter that may move."""
+    return Parameter(*key, size, 1e-3 * _WIDTH * size, _WIDTH * size)
 
 
 def _explaining(found: Search, free: Sequence[Parameter], explains: Callable[[Search], bool]) -> tuple[Misstated, ...]:
@@ -105,11 +103,9 @@ def _explaining(found: Search, free: Sequence[Parameter], explains: Callable[[Se
 def _moved(fitted: ContinuousFit, free: Sequence[Parameter]) -> tuple[Misstated, ...]:
     """Return numbers where a fit has them, with their standard errors; none where these are not known."""
     fit = fitted.fit
-    if fit.covariance.shape[0] != len(fit.parameters):
-        return ()
     places = {q.key: k for k, q in enumerate(fit.parameters)}
     some = [places[q.key] for q in free]
-    values, sd = fit.at[some], np.sqrt(np.maximum(np.diag(fit.covariance)[some], 0.0))
+    values, sd = fit.at[some], standard_errors(fitted)[some]
     if not np.all(np.isfinite([values, sd])):
         return ()
     triples = zip(free, values.tolist(), sd.tolist(), strict=True)

@@ -101,13 +101,17 @@ def _with_law_of_one(tried: Tried, question: Question) -> Tried:
     contradiction, ready = tried.contradiction, tried.prepared
     if contradiction is None or contradiction.lost or len(contradiction.against) != 1:
         return tried
-    free = free_parameters(ready.setup)
-    problem = SearchProblem(ready.fitted, as_stated=ready.meant, free=free, effects=question.effects)
     question.progress("looking for a law", 4, 5)
-    begun, law = _law_before_effects(problem)
+    begun, law = _law_before_effects(_without_hints(ready, question))
     if law is None or law.law.target.partition(".")[0] not in contradiction.against:
         return tried
     return Tried(ready, None, begun, law) if law.explains_all else tried
+
+
+def _without_hints(ready: Prepared, question: Question) -> SearchProblem:
+    """Return the problem of recordings of which no sensor has told anything before a fit."""
+    free = free_parameters(ready.setup)
+    return SearchProblem(ready.fitted, as_stated=ready.meant, free=free, effects=question.effects)
 
 
 def _with_numbers(tried: Tried, question: Question) -> Tried:
@@ -115,9 +119,7 @@ def _with_numbers(tried: Tried, question: Question) -> Tried:
     ready = tried.prepared
     if tried.contradiction is None or "gyroscope" not in tried.contradiction.blamed or ready.rows is not None:
         return tried
-    free = free_parameters(ready.setup)
-    problem = SearchProblem(ready.fitted, as_stated=ready.meant, free=free, effects=question.effects)
-    numbers = reconciling(problem, lambda found: not leaves_more_than_noise(found))
+    numbers = reconciling(_without_hints(ready, question), lambda found: not leaves_more_than_noise(found))
     return replace(tried, misstated=(numbers,)) if numbers else tried
 
 

@@ -6,7 +6,6 @@ from collections import Counter
 
 import numpy as np
 
-from discsim.arrays import FloatArray
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.kind import BOARD
@@ -19,7 +18,7 @@ from discsim.validation.diagnosis.result import (
     Recalibration,
     Verdict,
 )
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.continuous_fit import standard_errors
 from discsim.validation.diagnosis.selection.search_state import Search, misses
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Tried
@@ -33,7 +32,6 @@ __all__ = [
     "leaves_more_than_noise",
     "may_be_the_air",
     "recalibrations",
-    "standard_errors",
 ]
 
 
@@ -157,11 +155,3 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
             name = f"{name} ({','.join(str(i + 1) for i in sorted(q.recordings))})"
         result[name] = Recalibration(q.stated, sigma, float(value), float(error))
     return result
-
-
-def standard_errors(fitted: ContinuousFit) -> FloatArray:
-    """Return the standard errors (p,) of a fit's parameters, NaN where it has no covariance."""
-    covariance = fitted.fit.covariance
-    if covariance.shape[0] != len(fitted.fit.parameters):
-        return np.full(len(fitted.fit.parameters), np.nan)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from discsim.arrays import FloatArray
-from discsim.disc import Aero, aero_key
+from discsim.disc import Aero, Disc, aero_key
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import PositionOffset
 from discsim.recording import Recording
@@ -64,11 +64,15 @@ def _exact(recording: Recording) -> dict[tuple[str, str], float]:
     found: dict[tuple[str, str], float] = {}
     if disc is not None and "disc" in plant.hardware:
         names = _DISC if plant.air_modelled else {"Ixx_kg_m2": "Ixx"}
-        sizes = {name: disc.diameter if place == "d" else getattr(disc, place) for name, place in names.items()}
-        found |= {("disc", names[name]): float(size) for name, size in sizes.items() if name not in disc.sigma}
+        found |= {("disc", place): _size(disc, place) for name, place in names.items() if name not in disc.sigma}
     if rig is not None and "rig" in plant.hardware and "viscous_N_m_s" not in rig.sigma:
         found["rig", "viscous"] = float(rig.viscous)
     return {key: size for key, size in found.items() if size > 0.0}
+
+
+def _size(disc: Disc, place: str) -> float:
+    """Return a size of a disc by its place among parameters."""
+    return float(disc.diameter if place == "d" else getattr(disc, place))
 
 
 def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
@@ -91,9 +95,7 @@ def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
     if disc is not None and "disc" in hardware:
         for key, sigma in disc.sigma.items():
             if key in _DISC:
-                place = _DISC[key]
-                value = disc.diameter if place == "d" else getattr(disc, place)
-                yield "disc", place, float(value), float(np.max(sigma))
+                yield "disc", _DISC[key], _size(disc, _DISC[key]), float(np.max(sigma))
         if disc.aero is not None and "aero" in hardware:
             for name in Aero._fields:
                 if aero_key(name) in disc.sigma:

@@ -33,7 +33,7 @@ from discsim.validation.identification.residual_tests import UnmodelledResidual,
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import CLOCKS
 
-__all__ = ["ContinuousFit", "continuous_fit"]
+__all__ = ["ContinuousFit", "continuous_fit", "standard_errors"]
 
 
 @dataclass(frozen=True)
@@ -253,3 +253,11 @@ def _of_starts(fit: Fit) -> float:
     told = zip(fit.parameters, np.diag(fit.covariance), strict=True)
     shares = [variance / q.sigma**2 for q, variance in told if q.key in fit.plant.held_keys]
     return float(-np.sum(np.log(np.clip(shares, 1e-12, 1.0))))
+
+
+def standard_errors(fitted: ContinuousFit) -> FloatArray:
+    """Return the standard errors (p,) of a fit's parameters, NaN where it has no covariance."""
+    covariance = fitted.fit.covariance
+    if covariance.shape[0] != len(fitted.fit.parameters):
+        return np.full(len(fitted.fit.parameters), np.nan)
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -16,6 +16,7 @@ from discsim.validation.diagnosis.selection.best_refit import Refitted, best_of
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, price
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start
 from discsim.validation.diagnosis.selection.offers import Offer, in_chi2, in_turn
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import (
@@ -39,7 +40,7 @@ from discsim.validation.diagnosis.selection.search_state import (
 )
 from discsim.validation.diagnosis.selection.starting_point import HELD
 from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.identification.gauss_newton import Bars, merit_of
+from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
 from discsim.validation.identification.noise import NoiseModel, stated_noise
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS
 
@@ -114,33 +115,34 @@ def next_two(found: Search, alone: ContinuousFit | None = None) -> tuple[Search,
     refitted until one leaves nothing but noise. Lost samples are counted and stand in no algebra: they are tried beside
     the effect that is best ``alone``, lest a clock stands for them.
     """
-    base, noise = found.base, found.relaxed_noise
     ranked = pairs(found.relaxed_equations, found.candidates, found.own)
     sensible = [pair for pair in ranked if on_the_disc(found, pair.start)]
     chosen = sensible[: SELECTION.pairs_refitted]
     best: ContinuousFit | None = None
     for number, pair in enumerate(chosen):
         refitting("refitting with two", " and ".join(c.id for c in pair.hypothesis.candidates), number, len(chosen))
-        start = {**pair.start, **wobbles(found.relaxed_fit)}
-        # it counts only where it comes near the data
-        both = continuous_fit(
-            found.relaxed_fit,
-            pair.hypothesis,
-            found.own,
-            noise,
-            start,
-            bars=Bars(SELECTION.hopeless * SELECTION.far * found.base.fit.count),
-        )
-        both = found.with_cost(both)
+        both = _fit_of_two(found, found.relaxed_fit, pair.hypothesis, {**pair.start, **wobbles(found.relaxed_fit)})
         for candidate in pair.hypothesis.candidates:
-            found = _considering(found, base.score, both, candidate)
-        worth = base.score - both.score > sum(map(price, pair.hypothesis.candidates))
-        if not worth or not possible(both) or far(found, both):
+            found = _considering(found, found.base.score, both, candidate)
+        if not _counts(found, both):
             continue
         best = both if best is None or both.worse_than(best) < 0.0 else best
         if not both.unmodelled():
             break
     return (found, best) if alone is None else _beside_losses(found, alone, best)
+
+
+def _fit_of_two(found: Search, about: Fit, hypothesis: Hypothesis, start: Start, cost: float = 0.0) -> ContinuousFit:
+    """Return a fit of two effects from a relaxed fit, which counts only where it comes near the data."""
+    bars = Bars(SELECTION.hopeless * SELECTION.far * found.base.fit.count)
+    both = continuous_fit(about, hypothesis, found.own, found.relaxed_noise, start, bars=bars)
+    return found.with_cost(both, cost)
+
+
+def _counts(found: Search, both: ContinuousFit) -> bool:
+    """Tell whether a fit of two effects is worth their price and comes near the data."""
+    worth = found.base.score - both.score > sum(map(price, both.hypothesis.candidates))
+    return worth and possible(both) and not far(found, both)
 
 
 def _beside_losses(
@@ -151,17 +153,12 @@ def _beside_losses(
     for item in found.lost_samples.found:
         if item.screened.candidate.id in {candidate.id for candidate in alone.hypothesis.candidates}:
             continue
-        both = continuous_fit(
-            item.in_place_of(found.relaxed_fit),
+        hypothesis, start = (
             alone.hypothesis.plus(item.screened.candidate),
-            found.own,
-            found.relaxed_noise,
             {**values_of_fit(alone), **item.screened.start},
-            bars=Bars(SELECTION.hopeless * SELECTION.far * found.base.fit.count),
         )
-        both = found.with_cost(both, item.cost)
-        worth = found.base.score - both.score > sum(map(price, both.hypothesis.candidates))
-        if worth and possible(both) and not far(found, both) and (best is None or both.worse_than(best) < 0.0):
+        both = _fit_of_two(found, item.in_place_of(found.relaxed_fit), hypothesis, start, item.cost)
+        if _counts(found, both) and (best is None or both.worse_than(best) < 0.0):
             best, chosen = both, item
     if chosen is None:
         return found, best

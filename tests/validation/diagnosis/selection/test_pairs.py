@@ -7,12 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.made import FIELD, throws
+from support.made import tables, throws
 
 from discsim.effects import Effect, effect
 from discsim.recording import Samples
-from discsim.rig import turn_table
-from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.design.next_recording import confusions
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
@@ -205,13 +203,7 @@ def test_lost_samples_are_tried_beside_the_best_effect_before_a_clock_stands_for
         Samples(np.array([0.0, 1.0, 3.0, 5.0, 6.5, 8.0]), np.array([20.0, 20.0, -40.0, -40.0, 10.0, 10.0])),
     )
     errors = [effect("accel.position_offset", dx_m=0.002, dy_m=-0.0016), effect("mag.dropped_samples", fraction=0.01)]
-    made = []
-    for k, turn in enumerate(turns):
-        module = Instruments.from_parts("mpu9250").with_effects(errors)
-        motion = turn_table(turn, FIELD, (), yaw=0.3 + k)
-        rng = np.random.default_rng(20 + k)
-        made.append(record(motion, module, rng, plant="rate_table", name=f"table-{k}", command=turn))
-    begun = screened(SearchProblem(made))
+    begun = screened(SearchProblem(tables((), errors, turns)))
     found, alone = next_effect(begun, begun.final, 0)
     assert alone is not None
     assert ids_of(alone.hypothesis) == {"accel.position_offset"}

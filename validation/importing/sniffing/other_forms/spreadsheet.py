@@ -14,6 +14,7 @@ from typing import Any
 from discsim.errors import InputError
 from discsim.validation.importing.sniffing.other_forms.written import (
     comma_separated,
+    first_bytes,
     holds_log,
     read_and_left,
     write_named,
@@ -29,13 +30,12 @@ MAX_BYTES = 1 << 29
 
 def begins(path: Path) -> bool:
     """Tell a spreadsheet by its first bytes, and one that is packed as a zip by what is in it."""
+    head = first_bytes(path, len(_OLD))
+    if head == _OLD:
+        return path.suffix.lower() == ".xls"
+    if not head.startswith(b"PK\x03\x04"):
+        return False
     try:
-        with path.open("rb") as stream:
-            head = stream.read(len(_OLD))
-        if head == _OLD:
-            return path.suffix.lower() == ".xls"
-        if not head.startswith(b"PK\x03\x04"):
-            return False
         with zipfile.ZipFile(path) as archive:
             names = {member.filename for member in archive.infolist()}
             within = sum(member.file_size for member in archive.infolist()) <= MAX_BYTES
