@@ -24,6 +24,7 @@ from discsim.parameters import parameter_index, parameters
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.dynamics import ROW
 from discsim.validation.identification.linear import Channel, Linear
+from discsim.validation.identification.looks import Look, looks_at, of_each
 from discsim.validation.identification.parameters import Values
 from discsim.validation.identification.plants import Plant
 from discsim.validation.identification.prediction import Sampled
@@ -38,7 +39,7 @@ from discsim.validation.identification.propagation import (
 )
 from discsim.validation.identification.readings import group_of
 from discsim.validation.identification.segments import Trajectory, stepped
-from discsim.validation.identification.sensitivities import readings_of_neighbours
+from discsim.validation.identification.sensitivities import add_weighted, readings_of_neighbours, write_slopes
 from discsim.validation.identification.sensor_model import CLOCKS, is_motion, predicted, sensed
 
 __all__ = ["linearise", "moved", "reread"]
@@ -234,27 +235,25 @@ class _Read:
         Each segment starts from a state of its own, so that shares of them run side by side on ``threads``.
         """
         ends = np.empty(self._around.states.shape)
+        looks = looks_at([s.instants for s in self._samples], segment_of, len(ends))
         shares = np.array_split(np.arange(len(ends)), max(1, min(threads, len(ends) // _SHARE)))
         if len(shares) == 1:
-            self._run(shares[0], segment_of, ends)
+            self._run(shares[0], looks, ends)
             return ends
         with ThreadPoolExecutor(len(shares)) as pool:
-            tasks = [pool.submit(copy_context().run, self._run, share, segment_of, ends) for share in shares]
+            tasks = [pool.submit(copy_context().run, self._run, share, looks, ends) for share in shares]
             for task in tasks:
                 task.result()
         return ends
 
-    def _run(self, share: IntArray, segment_of: Sequence[IntArray], ends: FloatArray) -> None:
+    def _run(self, share: IntArray, looks: Sequence[Look], ends: FloatArray) -> None:
         """Run a share of the segments, read the sensors, and write the states (c, s) at its ends into ``ends``."""
         around, nodes = self._around, self._around.trajectory.nodes
         waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
         acted, flats, owns = around.everyone, around.flats, around.owns
         for i in share:
             start, stop = float(nodes[i]), float(nodes[i + 1])
-            own = [np.flatnonzero(segment == i) for segment in segment_of]
-            instants = [s.instants[o] for s, o in zip(self._samples, own, strict=True)]
-            # sensors of one board share their instants: the motion at each is worked out once
-            out, place = np.unique(np.concatenate([np.empty(0), *instants]), return_inverse=True)
+            own, place, out = looks[i]
             last_instant = float(out[-1]) if out.size else stop
             times, last = around.runner.times(start, stop, last_instant, around.trajectory.states[i])
             acting = around.acting(start, float(times[-1]))
@@ -316,7 +315,7 @@ class _Read:
                 if place >= 0 and around.columns[around.motion[place]].key in _ALSO_READ:
                     # it moves the readings of a given motion, too
                     follows[:, :, j] += self._also_moved(s.sensor, t, motion, around.columns[around.motion[place]])
-            self.slopes[which][o[:, None], :, columns] = np.moveaxis(follows, 2, 1)
+            write_slopes(follows, o, columns, self.slopes[which])
 
     def _also_moved(self, sensor: str, t: FloatArray, rows: FloatArray, column: Column) -> FloatArray:
         """Return how what a sensor reads of a given motion follows a parameter, (m, width)."""
@@ -531,11 +530,11 @@ def _by_unknowns(s: Sampled, M: FloatArray, segment: IntArray, continuity: _Cont
         full[:, :, u:] = s.weighted(M[:, :, d:])
     assert s.weights is not None
     weights, reading = s.weights.ravel(), np.arange(M.shape[0]) % full.shape[0]
-    for i in np.unique(segment):
-        mine = np.flatnonzero((segment == i) & (weights != 0.0))
+    for i, mine in enumerate(of_each(segment, S.shape[0])):
+        mine = mine[weights[mine] != 0.0]
         which, place = np.unique(reading[mine], return_inverse=True)
         said = np.zeros((which.size, M.shape[1], d))
-        np.add.at(said, place, weights[mine, None, None] * M[mine, :, :d])
+        add_weighted(M, weights, mine, place, said)
         # a state follows what comes before it alone
         before = d + i * continuity.allowed.size
         full[which, :, :before] += said @ S[i, :, :before]

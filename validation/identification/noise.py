@@ -70,17 +70,31 @@ def whitened(linear: Linear, noise: NoiseModel, columns: FloatArray, segment: In
     """
     result = np.zeros_like(columns)
     for channel in linear.channels:
-        own = noise[channel.group]
-        x = columns[channel.rows] / own.sd
-        if own.relative:
-            x /= linear.sd[channel.rows, None]
-        if own.correlation and x.shape[0] > 1:
-            segments = None if segment is None else segment[channel.rows]
-            cuts = [] if segments is None else [*(np.flatnonzero(np.diff(segments) != 0) + 1)]
-            for start, stop in pairwise([0, *cuts, x.shape[0]]):
-                x[start:stop] = _freed(x[start:stop], own, channel.index[start:stop])
-        result[channel.rows] = x
+        segments = None if segment is None else segment[channel.rows]
+        result[channel.rows] = whitened_channel(linear, noise, channel, columns[channel.rows], segments)
     return result
+
+
+def whitened_channel(
+    linear: Linear, noise: NoiseModel, channel: Channel, rows: FloatArray, segment: IntArray | None = None
+) -> FloatArray:
+    """Return what `whitened` makes of the rows (m, c) of one channel, with the segment (m,) of each."""
+    own = noise[channel.group]
+    x = rows / own.sd
+    if own.relative:
+        x /= linear.sd[channel.rows, None]
+    if not own.correlation or x.shape[0] < 2:
+        return np.asarray(x)
+    cuts = np.empty(0, dtype=np.int64) if segment is None else np.flatnonzero(np.diff(segment) != 0) + 1
+    if own.share >= 1.0:
+        # rows follow the one before them alone: all at once, and the first of each segment as it was
+        first = x[cuts]
+        x = _freed(x, own, channel.index)
+        x[cuts] = first
+        return x
+    for start, stop in pairwise([0, *cuts, x.shape[0]]):
+        x[start:stop] = _freed(x[start:stop], own, channel.index[start:stop])
+    return x
 
 
 def _freed(x: FloatArray, noise: GroupNoise, index: IntArray) -> FloatArray:

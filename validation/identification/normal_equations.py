@@ -14,7 +14,7 @@ from scipy.linalg import cho_solve, solve_triangular
 
 from discsim.arrays import FloatArray
 from discsim.validation.identification.linear import Linear
-from discsim.validation.identification.noise import NoiseModel, whitened
+from discsim.validation.identification.noise import NoiseModel, whitened, whitened_channel
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
 from discsim.validation.identification.release_prior import release_rows
 from discsim.validation.identification.segments import Trajectory
@@ -97,13 +97,21 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     G[:u, :u] = np.tril(G[:u, :u]) + np.tril(G[:u, :u], -1).T
     G[u:, :u] = G[:u, u:].T
     if linear.whole.size:
-        # readings that hang on several segments come in whole channels
-        spread = linear.segment < 0
-        columns = np.zeros((linear.raw.size, width))
-        columns[spread, :-1], columns[spread, -1] = linear.whole, linear.residual[spread]
-        A = whitened(linear, noise, columns)[spread]
+        A = _spread_rows(linear, noise)
         G += A.T @ A
     return G
+
+
+def _spread_rows(linear: Linear, noise: NoiseModel) -> FloatArray:
+    """Return the whitened rows (m, l + p + 1) of readings that hang on several segments, which are whole channels."""
+    parts, at, residual = [], 0, linear.residual
+    for channel in linear.channels:
+        count = channel.index.size
+        if count and linear.segment[channel.rows.start] < 0:
+            rows = np.hstack([linear.whole[at : at + count], residual[channel.rows, None]])
+            parts.append(whitened_channel(linear, noise, channel, rows))
+            at += count
+    return np.concatenate(parts)
 
 
 def unknown_prior(linear: Linear, current: Trajectory, defects: AllowedDefects) -> tuple[FloatArray, FloatArray, float]:

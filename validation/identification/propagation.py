@@ -112,7 +112,9 @@ class Runner:
                 if abs(0.5 * (a + b) - t) < 6 * width:
                     fine = min(fine, 0.25 * width)
             n = max(1, int(np.ceil((b - a) / fine - 1e-9)))
-            steps.append(np.linspace(a, b, n + 1)[1:])
+            even = np.arange(1, n + 1) * ((b - a) / n) + a
+            even[-1] = b
+            steps.append(even)
         times = np.concatenate(steps)
         return times, int(np.argmin(np.abs(times - stop)))
 

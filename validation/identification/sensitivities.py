@@ -15,7 +15,14 @@ from discsim.arrays import FloatArray, IntArray
 from discsim.compiled import compiled_nogil
 from discsim.frames import multiply
 
-__all__ = ["MOTION", "followed", "readings_and_slopes", "readings_of_neighbours"]
+__all__ = [
+    "MOTION",
+    "add_weighted",
+    "followed",
+    "readings_and_slopes",
+    "readings_of_neighbours",
+    "write_slopes",
+]
 
 #: the numbers of a row of motion by what they are: three each, of the attitude its small turns in B
 MOTION = ("position", "velocity", "acceleration", "attitude", "rate", "angular_acceleration")
@@ -138,3 +145,22 @@ def _turn_between(base: FloatArray, ahead: FloatArray, behind: FloatArray, chang
         change[at] += size * (aw * bx + ax * bw + ay * bz - az * by)
         change[at + 1] += size * (aw * by - ax * bz + ay * bw + az * bx)
         change[at + 2] += size * (aw * bz + ax * by - ay * bx + az * bw)
+
+
+@compiled_nogil
+def write_slopes(follows: FloatArray, rows: IntArray, columns: IntArray, slopes: FloatArray) -> None:
+    """Write slopes (m, width, n) into some rows (m,) and columns (n,) of all."""
+    for i in range(rows.size):
+        for w in range(follows.shape[1]):
+            for j in range(columns.size):
+                slopes[rows[i], w, columns[j]] = follows[i, w, j]
+
+
+@compiled_nogil
+def add_weighted(M: FloatArray, weights: FloatArray, mine: IntArray, place: IntArray, said: FloatArray) -> None:
+    """Add the first slopes of some rows (m,) of M (n, width, c), each by its weight, to their places in said."""
+    for j in range(mine.size):
+        weight = weights[mine[j]]
+        for w in range(said.shape[1]):
+            for c in range(said.shape[2]):
+                said[place[j], w, c] += weight * M[mine[j], w, c]

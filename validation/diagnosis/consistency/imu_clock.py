@@ -234,7 +234,7 @@ def _on_teeth(wobble: _Wobble, fitted: _Fitted, period: float) -> FloatArray:
     phase = float(np.angle(middle)) / (2.0 * np.pi) * period
     first = phase + period * np.floor((wobble.asked - phase) / period)
     teeth = np.stack([first + k * period for k in (-1, 0, 1)])
-    reads = np.stack([wobble.columns(one)[0] @ fitted.x for one in teeth])
+    reads = (wobble.columns(teeth.ravel())[0] @ fitted.x).reshape(teeth.shape)
     off = np.abs(wobble.value - reads) ** 2
     # the newest sample is at most a period older than the instant of asking, which is within one of the field's
     off[(teeth <= wobble.asked - period) | (teeth >= wobble.asked + wobble.within)] = np.inf

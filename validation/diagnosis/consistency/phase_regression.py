@@ -138,7 +138,8 @@ def signals_of(recording: Recording) -> list[Signal]:
 def slow_columns(t: FloatArray, end: float, knots_s: float) -> FloatArray:
     """Return cubic splines (n, p) at times (n,) s, for what is slow from 0 to ``end``: a knot each ``knots_s``."""
     knots = np.concatenate([np.zeros(3), np.linspace(0.0, end, 2 + int(end / knots_s)), np.full(3, end)])
-    return np.asarray(BSpline.design_matrix(np.clip(t, 0.0, end * (1.0 - 1e-12)), knots, 3).toarray())
+    each = BSpline.construct_fast(knots, np.eye(knots.size - 4), 3)
+    return np.asarray(each(np.clip(t, 0.0, end * (1.0 - 1e-12))))
 
 
 def signal_of(recording: Recording, name: str) -> Signal | None:

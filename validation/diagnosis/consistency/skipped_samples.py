@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.special import xlogy
 
 from discsim.arrays import FloatArray, IntArray
+from discsim.compiled import compiled_nogil
 
 __all__ = ["OFF", "Loops", "loops_beside"]
 
@@ -55,8 +56,7 @@ def loops_beside(newest: Mapping[str, IntArray], periods: Mapping[str, float], s
     longest = max(float(one[-1]) for one in shown.values())
     ratios = np.linspace(least, most, 2 + int((most - least) * longest / _APART))
     each = {
-        name: np.array([_log_mean(_log_likelihoods(one, float(ratio))) for ratio in ratios])
-        for name, one in shown.items()
+        name: np.array([_log_mean(phases) for phases in _log_likelihoods(one, ratios)]) for name, one in shown.items()
     }
     together = np.sum(list(each.values()), axis=0)
     apart = sum(_log_mean(one) for one in each.values())
@@ -71,17 +71,33 @@ def _log_mean(log: FloatArray) -> float:
     return best + float(np.log(np.mean(np.exp(log - best))))
 
 
-def _log_likelihoods(shown: FloatArray, ratio: float) -> FloatArray:
-    """Return the log likelihoods (phases,) of samples (n,) beside a loop, beyond that of rows lost at random alone.
+def _log_likelihoods(shown: FloatArray, ratios: FloatArray) -> FloatArray:
+    """Return the log likelihoods (k, phases) of samples (n,) beside loops, beyond that of rows lost at random alone.
 
-    The loop's step is ``ratio`` periods long. A sample within which no step falls can only have been miscounted.
+    The loops' steps are ``ratios`` (k,) periods long. A sample within which no step falls was miscounted.
     """
-    phases = ratio * np.arange(_PHASES)[:, None] / _PHASES
-    step = np.ceil((shown - phases) / ratio)
-    missed = np.count_nonzero(phases + ratio * step >= shown + 1.0, axis=1)
+    missed, steps = _steps_within(shown, ratios, _PHASES)
     sure = missed * np.log(_MISCOUNTED) + (shown.size - missed) * np.log1p(-_MISCOUNTED)
     rows = float(shown.size - 1)
-    return np.asarray(_of_losses(rows, step[:, -1] - step[:, 0]) + sure - _of_losses(rows, shown[-1]))
+    return np.asarray(_of_losses(rows, steps) + sure - _of_losses(rows, shown[-1]))
+
+
+@compiled_nogil
+def _steps_within(shown: FloatArray, ratios: FloatArray, phases: int) -> tuple[FloatArray, FloatArray]:
+    """Return within how many samples (n,) no step of a loop falls, and its steps from first to last, (k, phases) each.
+
+    A loop's step is one of ``ratios`` (k,) periods long, and falls at one of so many ``phases`` of it.
+    """
+    missed, steps = np.zeros((ratios.size, phases)), np.zeros((ratios.size, phases))
+    for k in range(ratios.size):
+        ratio = ratios[k]
+        for j in range(phases):
+            phase = ratio * j / phases
+            for one in shown:
+                if phase + ratio * np.ceil((one - phase) / ratio) >= one + 1.0:
+                    missed[k, j] += 1.0
+            steps[k, j] = np.ceil((shown[-1] - phase) / ratio) - np.ceil((shown[0] - phase) / ratio)
+    return missed, steps
 
 
 def _of_losses(rows: float, steps: ArrayLike) -> FloatArray:

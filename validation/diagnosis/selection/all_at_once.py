@@ -61,7 +61,8 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     told = {hint.candidate.id for hint in lags}
     turns = [free_candidate(id) for id in sorted(TURNED & competing) if CATALOGUE[id].type is Mount]
     fits = _few(found, every, turns, told)
-    if all(one.unmodelled() for one in fits):
+    if all(one.unmodelled() and far(found, one) for one in fits):
+        # beside the data the few leave what no ordinary error stands for
         fits += _many(found, every, told)
     fits = [one for one in fits if possible(one)]
     if not fits:

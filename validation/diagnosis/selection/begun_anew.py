@@ -14,10 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.first_trajectory import begun_again_in_true_time, first_trajectory, time_ratio
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit
+from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import chi_squared
 from discsim.validation.identification.segments import Trajectory
 
@@ -34,22 +36,27 @@ _STEPS, _STEPS_OF_ALL = 16, 8
 
 # far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
 @np.errstate(over="ignore", invalid="ignore")
-def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
+def begun_anew(fit: Fit, first: Sequence[Trajectory], given: Sequence[Linear] = ()) -> Fit:
     """Return a fit whose recordings that stand out were begun anew, where that ends lower.
 
     ``first`` are the trajectories that the fit began with. Where the others are far from their data, too, something
-    else is missing, and the fit is returned as it is.
+    else is missing, and the fit is returned as it is. So is a recording of which another fit, whose linearisations are
+    ``given``, leaves as much: it is noisier than the others, or lacks physics that both lack.
     """
     other_time = fit.plant.airborne and any(time_ratio(fit.values(i)) != 1.0 for i in range(len(fit.trajectories)))
     in_doubt = fit.plant.weakly_identified or (other_time and not fit.from_release)
     if not in_doubt or len(fit.trajectories) < 2 or not np.isfinite(fit.merit):
         return fit
-    left = np.array([chi_squared(one, fit.noise, one.residual) / max(one.residual.size, 1) for one in fit.linears])
+    left = _left(fit, fit.linears)
+    known = _left(fit, given) if len(given) == len(left) else np.full(len(left), np.inf)
     better = dict[int, Fit]()
     for i in np.argsort(left)[::-1].tolist():
         others = float(np.median(np.delete(left, i)))
         level = _STANDS_OUT * others
-        if others < SELECTION.far and left[i] > level and (lower := _lower(fit, i, first[i], level)) is not None:
+        as_known = known[i] < _STANDS_OUT * left[i] and left[i] < _STANDS_OUT * known[i]
+        if others >= SELECTION.far or left[i] <= level or as_known:
+            continue
+        if (lower := _lower(fit, i, first[i], level)) is not None:
             better[i] = lower
     if not better:
         return fit
@@ -62,6 +69,11 @@ def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
         replace(fit, trajectories=tuple(trajectories), at=np.array(at)), iterations=_STEPS_OF_ALL, bounds=BOUNDS
     )
     return again if again.merit < fit.merit else fit
+
+
+def _left(fit: Fit, linears: Sequence[Linear]) -> FloatArray:
+    """Return chi-squared per reading (c,) of linearisations of the recordings, in the noise of a fit."""
+    return np.array([chi_squared(one, fit.noise, one.residual) / max(one.residual.size, 1) for one in linears])
 
 
 def _lower(fit: Fit, i: int, first: Trajectory, level: float) -> Fit | None:

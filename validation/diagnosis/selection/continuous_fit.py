@@ -150,7 +150,7 @@ def continuous_fit(
         effects = {candidate.id for candidate in hypothesis.candidates}
         plain = np.array([v if q.group in effects else q.stated for q, v in zip(parameters, at, strict=True)])
         fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS, bars=bars)
-    fit = begun_anew(fit, begun.trajectories)
+    fit = begun_anew(fit, begun.trajectories, relaxed_fit.linears)
     # a free spin, whose readings say little of some numbers, strays on its way
     further = 0 if plant.weakly_identified or not polish else _FURTHER
     for done in range(polish + further if fit.merit < min(bars) else 0):

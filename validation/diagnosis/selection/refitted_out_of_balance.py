@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import unbalanced
 from discsim.validation.diagnosis.relaxed_fit.sensor_residuals import left_across
+from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.exchange import eliminated_backward
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.screening import normal_equations_of
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 
@@ -19,23 +24,30 @@ def refitted_out_of_balance(found: Search) -> Search:
 
     It is returned as it is where that brings x and y of the gyroscope not much nearer. Here all errors of the sensors
     were fitted at once, also those that make its rates lean. Instants are known to well below a millisecond. So what is
-    left of its x and y is what turns the body.
+    left of its x and y is what turns the body. Before the body's own moments were free, an effect on the motion, as an
+    asymmetry of its inertia, may have stood for what they do, and holds a fit beside its optimum: these come last.
     """
-    fit = found.final.fit
-    if fit.plant.unbalanced is None or not found.final.hypothesis.candidates:
+    fit, every = found.final.fit, found.final.hypothesis.candidates
+    if fit.plant.unbalanced is None or not every:
         return found
-    start = replace(fit, trajectories=unbalanced(fit))
-    final = found.with_cost(
-        continuous_fit(start, found.final.hypothesis, found.own, fit.noise, values_of_fit(found.final))
-    )
-    nearer = left_across(replace(final.fit, noise=fit.noise)) < RELAXED_FIT.unbalanced * left_across(fit)
-    return replace(found, final=_without_what_stood_for_it(found, final)) if nearer else found
+    of_sensors = tuple(candidate for candidate in every if candidate.row.acts_on != "motion")
+    start, first = replace(fit, trajectories=unbalanced(fit)), Hypothesis(of_sensors or every)
+    final = found.with_cost(continuous_fit(start, first, found.own, fit.noise, values_of_fit(found.final)))
+    if left_across(replace(final.fit, noise=fit.noise)) >= RELAXED_FIT.unbalanced * left_across(fit):
+        return found
+    of_motion = [candidate for candidate in every if candidate not in first.candidates]
+    return replace(found, final=_with_what_is_worth_it(found, final, of_motion))
 
 
-def _without_what_stood_for_it(found: Search, final: ContinuousFit) -> ContinuousFit:
-    """Return a fit of bodies out of balance less the effects on the motion that are not worth their price any more.
-
-    Before the body's own moments were free, an asymmetry of its inertia stood for some of what they do.
-    """
-    of_sensors = [candidate for candidate in final.hypothesis.candidates if candidate.row.acts_on != "motion"]
-    return eliminated_backward(found, final, kept=of_sensors)
+def _with_what_is_worth_it(found: Search, final: ContinuousFit, candidates: Sequence[CandidateEffect]) -> ContinuousFit:
+    """Return a fit with those of some effects besides that are worth their price, as algebra and then a fit have it."""
+    for candidate in candidates:
+        fit, more = final.fit, (*final.hypothesis.candidates, candidate)
+        equations = normal_equations_of(fit, found.candidates, fit.noise, fit.continuous_defects)
+        if worth_of_each(equations, more, found.own)[candidate.name] <= price(candidate):
+            continue
+        fitted = continuous_fit(fit, Hypothesis(more), found.own, fit.noise, values_of_fit(final))
+        fitted = found.with_cost(fitted)
+        if final.score - fitted.score > price(candidate):
+            final = fitted
+    return final

@@ -85,6 +85,12 @@ def test_a_fit_at_its_optimum_is_returned_as_it_is():
     assert_array_equal(begun_anew(fit, first.trajectories).at, fit.at)
 
 
+def test_a_recording_of_which_another_fit_leaves_as_much_is_not_begun_anew():
+    first, fit = settled()
+    stuck = beside(fit, 1)
+    assert begun_anew(stuck, first.trajectories, stuck.linears) is stuck
+
+
 def test_a_motion_that_readings_tell_is_not_begun_anew():
     first, fit = settled()
     alone = replace(fit, trajectories=fit.trajectories[:1], linears=fit.linears[:1])
