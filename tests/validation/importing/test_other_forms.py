@@ -23,6 +23,7 @@ SENSORS = {"acc": (LOG.accel / G0).round(4), "gyro": (LOG.gyro / DEG).round(3), 
 ARRAYS = {"t": LOG.t, **SENSORS}
 NAMES = [f"{name}_{axis}" for name in SENSORS for axis in "xyz"]
 ROWS = [(int(ms), *row) for ms, row in zip(MS, np.column_stack(list(SENSORS.values())).tolist(), strict=True)]
+NAMED = list(zip(NAMES, (unit for unit in ("g", "dps", "uT") for _ in "xyz"), strict=True))
 UNITS = [unit for unit in ("g", "deg/s", "uT") for _ in "xyz"]
 
 
@@ -63,6 +64,24 @@ def with_units(gap: str, separator: str, encoding: str = "utf-8") -> Callable[[P
     return write
 
 
+def quoted(before: str, after: str, separator: str = ",", decimal: str = ".") -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        names = [f'="{name}"' if before == '="' else name for name in ("time_ms", *(f"{n}_{u}" for n, u in NAMED))]
+        lines = [separator.join(f"{before}{cell}{after}".replace(".", decimal) for cell in row) for row in ROWS]
+        path.write_text("\n".join([separator.join(names), *lines, ""]), encoding="utf-8")
+
+    return write
+
+
+def a_page(path: Path) -> None:
+    """As a microcontroller writes one: end tags of rows and cells left out, a table of settings before the log."""
+    head = "".join(f"<th>{name} ({unit})" for name, unit in (("time", "ms"), *NAMED))
+    rows = "\n".join("<tr>" + "".join(f"<td> {cell}" for cell in row) for row in ROWS)
+    settings = "<table><tr><td>range<td>2000 <b>dps</b></table><script>var t = '<td>1';</script>"
+    page = f"<!DOCTYPE html>\n<html><body><h1>Disc</h1>{settings}\n<table border=1><tr>{head}\n{rows}</table></html>"
+    path.write_text(page, encoding="utf-8")
+
+
 def in_a_structure() -> dict[str, object]:
     return {"log": {"time": LOG.t, "imu": {name: value.T for name, value in SENSORS.items()}}, "note": "backhand"}
 
@@ -79,6 +98,11 @@ FORMS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "line protocol, a measurement for each sensor": ("log.txt", points_by_sensor),
     "units in the cells": ("log.csv", with_units(" ", ",")),
     "units glued to numbers": ("log.txt", with_units("", "\t")),
+    "formulas": ("log.csv", quoted('="', '"')),
+    "formulas with decimal commas": ("log.csv", quoted('="', '"', ";", ",")),
+    "apostrophes": ("log.csv", quoted("'", "")),
+    "quoted by apostrophes": ("log.txt", quoted("'", "'", "\t")),
+    "a web page": ("log.html", a_page),
     "units with a degree sign": ("log.csv", with_units(" ", ";", "cp1252")),
 }
 
@@ -107,6 +131,24 @@ def test_what_was_read_and_what_was_not_is_said(tmp_path):
     assert "units stand in its cells (ms, g, deg/s, uT); moved to the names of the columns" in said["log.csv"]
 
 
+def test_registers_in_hex_are_read_as_counts(tmp_path):
+    """16 bits of each axis as they stand in the chip, their signs among them."""
+    counts = np.hstack([np.round(LOG.accel / G0 * 2048), np.round(LOG.gyro / DEG * 10)]).astype(int) % 65536
+    lines = [
+        f"{ms}," + ",".join(f"0x{count:04X}" for count in row) for ms, row in zip(MS, counts.tolist(), strict=True)
+    ]
+    names = ",".join(["ms", *(f"{name}{axis}" for name in "ag" for axis in "xyz")])
+    (tmp_path / "log.csv").write_text("\n".join([names, *lines, ""]), encoding="utf-8")
+    found = import_log(tmp_path / "log.csv")
+    assert "log.csv: numbers stand in its cells as formulas, with apostrophes or in hex" in found.summary()
+    assert_allclose(found.recordings[0].samples["accelerometer"].value, LOG.accel, atol=0.6 / 2048 * G0 + 1e-9)
+
+
+def test_of_a_page_is_said_which_tables_hold_no_log(tmp_path):
+    a_page(tmp_path / "log.html")
+    assert "log.html: a web page; read: table 2; not read: table 1" in import_log(tmp_path / "log.html").summary()
+
+
 def test_a_cell_with_another_unit_is_no_number(tmp_path):
     with_units(" ", ",")(tmp_path / "log.csv")
     lines = (tmp_path / "log.csv").read_text(encoding="utf-8").split("\n")
@@ -127,6 +169,7 @@ REFUSED: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "MATLAB 7.3": ("log.mat", lambda path: path.write_bytes(b"MATLAB 7.3 MAT-file" + bytes(600)), "'-v7'"),
     "a pickle": ("log.pkl", pickled, "may run anything"),
     "a data base of notes": ("log.db", lambda path: notes(path), "without rows of numbers"),
+    "a page without a table": ("log.html", lambda path: path.write_text("<html><p>403 Forbidden"), "without a table"),
     "a broken data base": ("log.db", lambda path: path.write_bytes(b"SQLite format 3\0" + bytes(90)), "a damaged SQL"),
 }
 

@@ -12,8 +12,10 @@ from pathlib import Path
 from discsim.validation.importing.sniffing.other_forms import (
     array_file,
     database,
+    html_tables,
     json_records,
     line_protocol,
+    quoted_cells,
     spreadsheet,
     teleplot,
     unit_cells,
@@ -22,9 +24,20 @@ from discsim.validation.importing.sniffing.other_forms import (
 
 __all__ = ["writer_of"]
 
-_FORMS = (json_records, spreadsheet, array_file, database, line_protocol, value_rows, teleplot, unit_cells)
-#: What a table of another form may be once more: a row for each value, or cells with their units.
-_AGAIN = (value_rows, unit_cells)
+_FORMS = (
+    json_records,
+    spreadsheet,
+    array_file,
+    database,
+    html_tables,
+    line_protocol,
+    value_rows,
+    teleplot,
+    quoted_cells,
+    unit_cells,
+)
+#: What a table of another form may be once more: a row for each value, or cells with quotes or their units.
+_AGAIN = (value_rows, quoted_cells, unit_cells)
 
 
 def writer_of(path: Path, *, again: bool = False) -> Callable[[Path, Path], list[str]] | None:

@@ -5,7 +5,6 @@ Takes a table with a line of names; each column must have one unit, or none, in 
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Sequence
 from itertools import chain, repeat
@@ -14,19 +13,16 @@ from typing import NamedTuple
 
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import GAPS
-from discsim.validation.importing.sniffing.other_forms.written import comma_separated, first_bytes, write_named
+from discsim.validation.importing.sniffing.other_forms.written import all_rows, comma_separated, first_rows, write_named
 
 __all__ = ["begins", "write_tables"]
 
-_ENDS = re.compile(r"\r\n?|\n")
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?"
 #: A number and what stands behind it: no digit, and no sign that would make it a date or a time.
 _CELL = re.compile(rf"\s*({_NUMBER})\s*([^\s\d:.,;/-][^\s:;]*(?: [^\s\d:;][^\s:;]*)?)\s*")
 _PLAIN = re.compile(rf"\s*(?:{_NUMBER})?\s*")
 #: Rows that are looked at, the fewest of them, and the columns with a unit without which nothing is moved.
 _ROWS, _FEWEST, _COLUMNS = 50, 3, 3
-#: Bytes of a table that is read whole, and of its beginning.
-MAX_BYTES, _HEAD = 1 << 29, 1 << 16
 
 
 def begins(path: Path) -> bool:
@@ -44,31 +40,13 @@ class _Layout(NamedTuple):
 
 def _layout(path: Path) -> _Layout | None:
     """Return how a table with units in its cells is written; None where this is none."""
-    head = first_bytes(path, _HEAD)
-    if b"\0" in head:
-        return None
-    encoding = _encoding(head)
-    lines = [line for line in _ENDS.split(head.decode(encoding, "replace"))[:-1] if line.strip()][: _ROWS + 1]
-    for separator in ";\t|,":
-        try:
-            rows = list(csv.reader(lines, delimiter=separator))
-        except csv.Error:  # a cell that is longer than any number
-            return None
-        if len(rows) > _FEWEST and len({len(row) for row in rows}) == 1 and len(rows[0]) >= _COLUMNS:
+    for encoding, separator, rows in first_rows(path, _ROWS):
+        if len(rows) > _FEWEST and len(rows[0]) >= _COLUMNS:
             units = [_unit([row[k] for row in rows[1:]]) for k in range(len(rows[0]))]
             names = not any(_PLAIN.fullmatch(cell) or _CELL.fullmatch(cell) for cell in rows[0])
             if names and sum(bool(unit) for unit in units) >= _COLUMNS:
                 return _Layout(encoding, separator, tuple(unit or "" for unit in units))
     return None
-
-
-def _encoding(head: bytes) -> str:
-    """Return UTF-8 where the whole lines of a beginning are that, else Windows' Latin-1: units have degree signs."""
-    try:
-        head[: head.rfind(b"\n")].decode("utf-8")
-    except UnicodeDecodeError:
-        return "cp1252"
-    return "utf-8-sig"
 
 
 def _unit(cells: Sequence[str]) -> str | None:
@@ -85,14 +63,10 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     A cell with another unit, or none, stays as it is, and is found with what else cannot be read. Raises `InputError`
     for a table that is too large.
     """
-    layout, size = _layout(raw), raw.stat().st_size
-    if layout is None or size > MAX_BYTES:
-        raise InputError.at(raw, None, f"has units in the cells of its {size >> 20} MB; expected them in a header")
-    try:
-        with raw.open(encoding=layout.encoding, errors="replace") as stream:
-            names, *rows = csv.reader((line for line in stream if line.strip()), delimiter=layout.separator)
-    except csv.Error as error:
-        raise InputError.at(raw, None, f"cannot be read as a table ({error}); expected cells of numbers") from None
+    layout = _layout(raw)
+    if layout is None:
+        raise InputError.at(raw, None, "has no units in its cells any more; expected the file that it was")
+    names, *rows = all_rows(raw, layout.encoding, layout.separator)
     named = zip(names, layout.units, strict=True)
     header = [f"{name.strip()} ({unit})" if unit else name.strip() for name, unit in named]
     moved = [list(map(_bare, row, chain(layout.units, repeat("")))) for row in rows]

@@ -5,14 +5,28 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["FEWEST", "comma_separated", "first_bytes", "holds_log", "read_and_left", "write_named"]
+from discsim.errors import InputError
+
+__all__ = [
+    "FEWEST",
+    "all_rows",
+    "comma_separated",
+    "first_bytes",
+    "first_rows",
+    "holds_log",
+    "read_and_left",
+    "write_named",
+]
 
 #: Rows of two numbers or more without which a table holds no log: a description of the phone has fewer.
 FEWEST = 10
+#: Bytes of a table that is read whole, and of its beginning.
+MAX_BYTES, _HEAD = 1 << 29, 1 << 16
+_ENDS = re.compile(r"\r\n?|\n")
 
 
 def first_bytes(path: Path, most: int) -> bytes:
@@ -22,6 +36,46 @@ def first_bytes(path: Path, most: int) -> bytes:
             return stream.read(most)
     except OSError:
         return b""
+
+
+def first_rows(path: Path, most: int) -> Iterator[tuple[str, str, list[list[str]]]]:
+    """Yield encoding, separator and first rows of cells by each separator that makes rows of one length of a file.
+
+    A line of names is among them, and at most so many others. Nothing where the file holds zeros, as no text does.
+    """
+    head = first_bytes(path, _HEAD)
+    if b"\0" in head:
+        return
+    encoding = _encoding(head)
+    lines = [line for line in _ENDS.split(head.decode(encoding, "replace"))[:-1] if line.strip()][: most + 1]
+    for separator in ";\t|,":
+        try:
+            rows = list(csv.reader(lines, delimiter=separator))
+        except csv.Error:  # a cell that is longer than any number
+            return
+        if rows and len({len(row) for row in rows}) == 1:
+            yield encoding, separator, rows
+
+
+def _encoding(head: bytes) -> str:
+    """Return UTF-8 where the whole lines of a beginning are that, else Windows' Latin-1: units have degree signs."""
+    try:
+        head[: head.rfind(b"\n")].decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def all_rows(raw: Path, encoding: str, separator: str) -> list[list[str]]:
+    """Return all rows of a table, empty lines left out; raises `InputError` where it is too large or no table."""
+    size = raw.stat().st_size
+    if size > MAX_BYTES:
+        raise InputError.at(raw, None, f"is a table of {size >> 20} MB; expected {MAX_BYTES >> 20} MB at most")
+    try:
+        with raw.open(encoding=encoding, errors="replace") as stream:
+            return list(csv.reader((line for line in stream if line.strip()), delimiter=separator))
+    except csv.Error as error:
+        raise InputError.at(raw, None, f"cannot be read as a table ({error}); expected cells of numbers") from None
 
 
 def holds_log(rows: Iterable[Sequence[Any]]) -> bool:
