@@ -180,6 +180,13 @@ def notes(path: Path) -> None:
         base.commit()
 
 
+def test_xml_with_tables_is_no_web_page(tmp_path):
+    """As Excel of 2003 writes it."""
+    (tmp_path / "log.xml").write_text('<?xml version="1.0"?>\n<Workbook><Table><Row/></Table></Workbook>\n' * 9)
+    with pytest.raises(InputError, match="XML"):
+        import_log(tmp_path / "log.xml")
+
+
 @pytest.mark.parametrize("form", REFUSED)
 def test_what_holds_no_log_is_refused_with_what_to_do(tmp_path, form):
     name, write, said = REFUSED[form]

@@ -5,6 +5,7 @@ Takes a file of HTML; gives a file of comma-separated text, or a folder with one
 
 from __future__ import annotations
 
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -26,7 +27,10 @@ _HEAD, MAX_BYTES = 4096, 1 << 28
 def begins(path: Path) -> bool:
     """Tell a page by its first bytes: a tag, and one of those that a page or a table begins with."""
     head = first_bytes(path, _HEAD).removeprefix(b"\xef\xbb\xbf").lstrip().lower()
-    return head.startswith(b"<") and any(tag in head for tag in (b"<html", b"<!doctype html", b"<table"))
+    if b"<!doctype html" in head or b"<html" in head:
+        return head.startswith(b"<")
+    # programs of spreadsheets write XML with tables, too
+    return re.match(rb"<(?!\?xml)", head) is not None and re.search(rb"<table[\s>]", head) is not None
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:
