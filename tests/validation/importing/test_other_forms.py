@@ -23,8 +23,8 @@ SENSORS = {"acc": (LOG.accel / G0).round(4), "gyro": (LOG.gyro / DEG).round(3), 
 ARRAYS = {"t": LOG.t, **SENSORS}
 NAMES = [f"{name}_{axis}" for name in SENSORS for axis in "xyz"]
 ROWS = [(int(ms), *row) for ms, row in zip(MS, np.column_stack(list(SENSORS.values())).tolist(), strict=True)]
-NAMED = list(zip(NAMES, (unit for unit in ("g", "dps", "uT") for _ in "xyz"), strict=True))
 UNITS = [unit for unit in ("g", "deg/s", "uT") for _ in "xyz"]
+HEADER = ["time (ms)", *(f"{name} ({unit})" for name, unit in zip(NAMES, UNITS, strict=True))]
 
 
 def a_data_base(path: Path) -> None:
@@ -66,7 +66,7 @@ def with_units(gap: str, separator: str, encoding: str = "utf-8") -> Callable[[P
 
 def quoted(before: str, after: str, separator: str = ",", decimal: str = ".") -> Callable[[Path], None]:
     def write(path: Path) -> None:
-        names = [f'="{name}"' if before == '="' else name for name in ("time_ms", *(f"{n}_{u}" for n, u in NAMED))]
+        names = [f'="{name}"' if before == '="' else name for name in HEADER]
         lines = [separator.join(f"{before}{cell}{after}".replace(".", decimal) for cell in row) for row in ROWS]
         path.write_text("\n".join([separator.join(names), *lines, ""]), encoding="utf-8")
 
@@ -75,7 +75,7 @@ def quoted(before: str, after: str, separator: str = ",", decimal: str = ".") ->
 
 def a_page(path: Path) -> None:
     """As a microcontroller writes one: end tags of rows and cells left out, a table of settings before the log."""
-    head = "".join(f"<th>{name} ({unit})" for name, unit in (("time", "ms"), *NAMED))
+    head = "".join(f"<th>{name}" for name in HEADER)
     rows = "\n".join("<tr>" + "".join(f"<td> {cell}" for cell in row) for row in ROWS)
     settings = "<table><tr><td>range<td>2000 <b>dps</b></table><script>var t = '<td>1';</script>"
     page = f"<!DOCTYPE html>\n<html><body><h1>Disc</h1>{settings}\n<table border=1><tr>{head}\n{rows}</table></html>"

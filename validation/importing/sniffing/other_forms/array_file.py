@@ -16,6 +16,7 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.validation.importing.sniffing.other_forms.written import (
     FEWEST,
+    check_size,
     comma_separated,
     first_bytes,
     read_and_left,
@@ -52,9 +53,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
 
     Raises `InputError` for a damaged file, one that is too large and one without arrays of numbers.
     """
-    size = raw.stat().st_size
-    if size > MAX_BYTES:
-        raise InputError.at(raw, None, f"is a file of arrays of {size >> 20} MB; expected at most {MAX_BYTES >> 20} MB")
+    check_size(raw, "a file of arrays", MAX_BYTES)
     try:
         found = dict(_arrays(_loaded(raw)))
     except Exception as error:  # whatever a parser of bytes stumbles on in a damaged file

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from discsim.validation.importing.sniffing.other_forms.written import (
+    check_size,
     comma_separated,
     first_bytes,
     holds_log,
@@ -32,9 +33,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
 
     Raises `InputError` for a damaged file, one that is too large and one without such a table.
     """
-    size = raw.stat().st_size
-    if size > MAX_BYTES:
-        raise InputError.at(raw, None, f"is a data base of {size >> 20} MB; expected at most {MAX_BYTES >> 20} MB")
+    check_size(raw, "a data base", MAX_BYTES)
     texts, left = {}, []
     try:
         # opened so that nothing is written beside it, whoever else has it open

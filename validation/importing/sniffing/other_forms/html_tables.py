@@ -6,14 +6,17 @@ Takes a file of HTML; gives a file of comma-separated text, or a folder with one
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 
 from discsim.errors import InputError
+from discsim.validation.importing.cell_texts import number
 from discsim.validation.importing.sniffing.other_forms.written import (
-    FEWEST,
+    check_size,
     comma_separated,
     first_bytes,
+    holds_log,
     read_and_left,
     write_named,
 )
@@ -38,19 +41,17 @@ def write_tables(raw: Path, target: Path) -> list[str]:
 
     Raises `InputError` where the page is too large, or holds no rows of numbers.
     """
-    size = raw.stat().st_size
-    if size > MAX_BYTES:
-        raise InputError.at(raw, None, f"is a web page of {size >> 20} MB; expected {MAX_BYTES >> 20} MB at most")
+    check_size(raw, "a web page", MAX_BYTES)
     page = _Tables()
     page.feed(raw.read_text("utf-8", "replace"))
     page.close()
     texts, left = {}, []
     for k, rows in enumerate(page.tables, 1):
         name = f"table {k}"
-        if sum(sum(map(_is_number, row)) >= 2 for row in rows) < FEWEST:
+        if not holds_log(_numbers(row) for row in rows):
             left.append(name)
             continue
-        texts[name] = comma_separated(row for row in rows if any(cell for cell in row))
+        texts[name] = comma_separated(row for row in rows if any(row))
     if not texts:
         raise InputError.at(
             raw, None, "is a web page without a table of readings; expected rows of two numbers or more"
@@ -59,12 +60,9 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     return [read_and_left(raw, "a web page", ", ".join(texts), left)]
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
+def _numbers(row: Sequence[str]) -> list[float]:
+    found = (number(cell, ",") for cell in row)
+    return [value for value in found if value is not None and value == value]
 
 
 class _Tables(HTMLParser):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from discsim.validation.importing.sniffing.other_forms.written import (
+    NUMBER,
     all_rows,
     comma_separated,
     first_rows,
@@ -18,13 +19,12 @@ from discsim.validation.importing.sniffing.other_forms.written import (
 
 __all__ = ["begins", "write_tables"]
 
-_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?"
 #: A formula whose text is a number, what an apostrophe keeps as text, and a number in hex.
-_QUOTED = re.compile(rf"\s*(?:=\s*\"\s*({_NUMBER})\s*\"|'\s*({_NUMBER})\s*'?|(0[xX][0-9a-fA-F]+))\s*")
+_QUOTED = re.compile(rf"\s*(?:=\s*\"\s*({NUMBER})\s*\"|'\s*({NUMBER})\s*'?|(0[xX][0-9a-fA-F]+))\s*")
 #: Text of a formula, as a name is written by the same program.
 _TEXT = re.compile(r"\s*=\s*\"(.*)\"\s*")
-#: Rows that are looked at, the fewest of them, and the columns of such cells without which nothing is rewritten.
-_ROWS, _FEWEST, _COLUMNS = 50, 3, 2
+#: The fewest rows below the names, and the columns of such cells without which nothing is rewritten.
+_FEWEST, _COLUMNS = 3, 2
 
 
 def begins(path: Path) -> bool:
@@ -34,7 +34,7 @@ def begins(path: Path) -> bool:
 
 def _layout(path: Path) -> tuple[str, str] | None:
     """Return encoding and separator of a table with such cells; None where this is none."""
-    for encoding, separator, (_, *rows) in first_rows(path, _ROWS):
+    for encoding, separator, (_, *rows) in first_rows(path):
         columns = list(zip(*rows, strict=True))
         if len(rows) >= _FEWEST and sum(all(map(_QUOTED.fullmatch, cells)) for cells in columns) >= _COLUMNS:
             return encoding, separator

@@ -13,16 +13,21 @@ from typing import NamedTuple
 
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import GAPS
-from discsim.validation.importing.sniffing.other_forms.written import all_rows, comma_separated, first_rows, write_named
+from discsim.validation.importing.sniffing.other_forms.written import (
+    NUMBER,
+    all_rows,
+    comma_separated,
+    first_rows,
+    write_named,
+)
 
 __all__ = ["begins", "write_tables"]
 
-_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?"
 #: A number and what stands behind it: no digit, and no sign that would make it a date or a time.
-_CELL = re.compile(rf"\s*({_NUMBER})\s*([^\s\d:.,;/-][^\s:;]*(?: [^\s\d:;][^\s:;]*)?)\s*")
-_PLAIN = re.compile(rf"\s*(?:{_NUMBER})?\s*")
-#: Rows that are looked at, the fewest of them, and the columns with a unit without which nothing is moved.
-_ROWS, _FEWEST, _COLUMNS = 50, 3, 3
+_CELL = re.compile(rf"\s*({NUMBER})\s*([^\s\d:.,;/-][^\s:;]*(?: [^\s\d:;][^\s:;]*)?)\s*")
+_PLAIN = re.compile(rf"\s*(?:{NUMBER})?\s*")
+#: The fewest rows below the names, and the columns with a unit without which nothing is moved.
+_FEWEST, _COLUMNS = 3, 3
 
 
 def begins(path: Path) -> bool:
@@ -40,7 +45,7 @@ class _Layout(NamedTuple):
 
 def _layout(path: Path) -> _Layout | None:
     """Return how a table with units in its cells is written; None where this is none."""
-    for encoding, separator, rows in first_rows(path, _ROWS):
+    for encoding, separator, rows in first_rows(path):
         if len(rows) > _FEWEST and len(rows[0]) >= _COLUMNS:
             units = [_unit([row[k] for row in rows[1:]]) for k in range(len(rows[0]))]
             names = not any(_PLAIN.fullmatch(cell) or _CELL.fullmatch(cell) for cell in rows[0])

@@ -13,7 +13,10 @@ from discsim.errors import InputError
 
 __all__ = [
     "FEWEST",
+    "FIRST_ROWS",
+    "NUMBER",
     "all_rows",
+    "check_size",
     "comma_separated",
     "first_bytes",
     "first_rows",
@@ -24,6 +27,9 @@ __all__ = [
 
 #: Rows of two numbers or more without which a table holds no log: a description of the phone has fewer.
 FEWEST = 10
+#: Rows below a line of names that a form looks at, and how a number is written, whatever its decimal mark.
+FIRST_ROWS = 50
+NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?"
 #: Bytes of a table that is read whole, and of its beginning.
 MAX_BYTES, _HEAD = 1 << 29, 1 << 16
 _ENDS = re.compile(r"\r\n?|\n")
@@ -38,16 +44,23 @@ def first_bytes(path: Path, most: int) -> bytes:
         return b""
 
 
-def first_rows(path: Path, most: int) -> Iterator[tuple[str, str, list[list[str]]]]:
+def check_size(raw: Path, what: str, most: int) -> None:
+    """Raise `InputError` where a file that is ``what`` has more bytes than are read whole."""
+    size = raw.stat().st_size
+    if size > most:
+        raise InputError.at(raw, None, f"is {what} of {size >> 20} MB; expected at most {most >> 20} MB")
+
+
+def first_rows(path: Path) -> Iterator[tuple[str, str, list[list[str]]]]:
     """Yield encoding, separator and first rows of cells by each separator that makes rows of one length of a file.
 
-    A line of names is among them, and at most so many others. Nothing where the file holds zeros, as no text does.
+    A line of names is among them, and at most `FIRST_ROWS` others. Nothing where the file holds zeros, as no text does.
     """
     head = first_bytes(path, _HEAD)
     if b"\0" in head:
         return
     encoding = _encoding(head)
-    lines = [line for line in _ENDS.split(head.decode(encoding, "replace"))[:-1] if line.strip()][: most + 1]
+    lines = [line for line in _ENDS.split(head.decode(encoding, "replace"))[:-1] if line.strip()][: FIRST_ROWS + 1]
     for separator in ";\t|,":
         try:
             rows = list(csv.reader(lines, delimiter=separator))
@@ -68,9 +81,7 @@ def _encoding(head: bytes) -> str:
 
 def all_rows(raw: Path, encoding: str, separator: str) -> list[list[str]]:
     """Return all rows of a table, empty lines left out; raises `InputError` where it is too large or no table."""
-    size = raw.stat().st_size
-    if size > MAX_BYTES:
-        raise InputError.at(raw, None, f"is a table of {size >> 20} MB; expected {MAX_BYTES >> 20} MB at most")
+    check_size(raw, "a table", MAX_BYTES)
     try:
         with raw.open(encoding=encoding, errors="replace") as stream:
             return list(csv.reader((line for line in stream if line.strip()), delimiter=separator))
