@@ -12,7 +12,6 @@ from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.screening import normal_equations_of
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 
@@ -43,8 +42,7 @@ def _with_what_is_worth_it(found: Search, final: ContinuousFit, candidates: Sequ
     """Return a fit with those of some effects besides that are worth their price, as algebra and then a fit have it."""
     for candidate in candidates:
         fit, more = final.fit, (*final.hypothesis.candidates, candidate)
-        equations = normal_equations_of(fit, found.candidates, fit.noise, fit.continuous_defects)
-        if worth_of_each(equations, more, found.own)[candidate.name] <= price(candidate):
+        if worth_of_each(found.about(fit).equations, more, found.own)[candidate.name] <= price(candidate):
             continue
         fitted = continuous_fit(fit, Hypothesis(more), found.own, fit.noise, values_of_fit(final))
         fitted = found.with_cost(fitted)
