@@ -257,7 +257,8 @@ class _Rows:
         self.number: list[IntArray] = []
         self.line: list[IntArray] = []
         self.texts: list[list[NDArray[Any]]] = [[] for _ in range(width)]
-        self.blank: int | None = None
+        self.blank: list[int] = []
+        self.last = 0
         self.records = RecordLines(layout.columns) if layout.labelled else None
 
     def add(self, lines: list[str], start: int, before: int) -> None:
@@ -266,6 +267,7 @@ class _Rows:
             return
         lines = lines[start:]
         first = before + start + 1
+        self.last = first + len(lines) - 1
         cells = self._even(lines)
         if cells is not None:
             number, line = np.arange(self.total, self.total + len(lines)), np.arange(first, first + len(lines))
@@ -290,7 +292,6 @@ class _Rows:
             return None  # blanks about cells are taken off one by one
         else:
             cells = [line.split(layout.separator) for line in lines]
-        self._tell_blank(None)
         return cells if all(len(row) == self.width for row in cells) else None
 
     def _one_by_one(self, lines: list[str], first: int) -> tuple[IntArray, IntArray, list[list[str]]]:
@@ -307,10 +308,9 @@ class _Rows:
 
     def _alone(self, line: int, whole: str) -> tuple[int, list[str]] | None:
         """Return the line and cells of a row in a line of its own; None for what is none, or damaged."""
-        self._tell_blank(line)
         text = _without_comment(self.path, line, whole, self.layout, self.repairs, self.width)
         if not text.strip():
-            self.blank = line if not whole.strip() else None
+            self.blank += [] if whole.strip() else [line]
             return None
         cells = self.layout.cells(text)
         if len(cells) == self.width:
@@ -331,14 +331,19 @@ class _Rows:
         self.repairs.add("width", self.path, line, what, "row left out")
         self.total += 1
 
-    def _tell_blank(self, line: int | None) -> None:
-        """List the blank line before this one: the file's last line may be blank."""
-        if self.blank is not None:
-            self.repairs.add(None, self.path, self.blank, "blank line", "line left out")
-            self.blank = None
+    def _tell_blank(self) -> None:
+        r"""List blank lines but the last; where lines end twice (``\n\r``), as many as rows, they are one repair."""
+        blank = [line for line in self.blank if line != self.last]
+        if len(blank) > 1 and len(blank) >= self.total - 1:
+            what = f"{len(blank)} blank lines, the first here: each line ends twice"
+            self.repairs.add(None, self.path, blank[0], what, "lines left out")
+            return
+        for line in blank:
+            self.repairs.add(None, self.path, line, "blank line", "line left out")
 
     def table(self, columns: tuple[str, ...], header_line: int) -> RawTable:
         """Return the table of all rows; the blocks are let go column by column."""
+        self._tell_blank()
         empty = np.empty(0, dtype=np.int64)
         number, line = np.concatenate([empty, *self.number]), np.concatenate([empty, *self.line])
         texts = []

@@ -73,6 +73,19 @@ def test_rows_that_are_read_at_once_are_those_that_are_read_one_by_one(tmp_path)
     assert (len(left), int(left.line[-1]), int(left.number[-1])) == (len(read) - 2, len(lines), left.total - 1)
 
 
+def test_lines_that_end_twice_are_one_repair_and_a_few_blank_ones_are_listed_each(tmp_path):
+    """Arduino programs write LF CR: 1001 repairs of one log hid the one that mattered."""
+    path = tmp_path / "log.csv"
+    path.write_bytes("\n\r".join(["t,a,b,c,d,e,f,g,h,i", *map(row, range(300)), ""]).encode())
+    repairs = RepairList(())
+    assert len(read_raw(path, Layout(), repairs)) == 300
+    assert [(one.line, one.action) for one in repairs.listed()] == [(2, "lines left out")]
+    path.write_text("\n".join(["t,a,b,c,d,e,f,g,h,i", *map(row, range(300)), "", row(300), "", ""]))
+    repairs = RepairList(())
+    assert len(read_raw(path, Layout(), repairs)) == 301
+    assert [(one.line, one.what) for one in repairs.listed()] == [(302, "blank line"), (304, "blank line")]
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp932", "latin-1"])
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_lines_are_those_of_the_whole_text_wherever_a_piece_of_it_ends(tmp_path, encoding, end, monkeypatch):
