@@ -11,6 +11,7 @@ from discsim.disc import Aero, AeroTable, Disc, Release
 from discsim.environment import Environment
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording
+from discsim.sensor_sheet import SensorSheet
 from discsim.validation.checking.finding import Finding, Severity, doubts_of
 
 __all__ = ["FIELD", "statement_findings", "unlikely_flight"]
@@ -40,6 +41,8 @@ WITHIN = 1.5
 NEAR = 0.1
 #: a storm, m/s
 WIND = 30.0
+#: output rates of parts are within this share of what their sheets state (BMI160, MPU-9250)
+RATE = 0.01
 
 
 def statement_findings(recording: Recording) -> Iterator[Finding]:
@@ -50,6 +53,7 @@ def statement_findings(recording: Recording) -> Iterator[Finding]:
     if recording.release is not None:
         yield from _release(recording.release)
     yield from _position(recording)
+    yield from _row_spacing(recording)
 
 
 def unlikely_flight(disc: Disc | None, environment: Environment, *releases: Release) -> list[str]:
@@ -312,3 +316,23 @@ def _position(recording: Recording) -> Iterator[Finding]:
             f"less than {limit:.3g} m" + " (the disc's radius)" * (radius is not None),
             "in mm?" if reach > 1 else "",
         )
+
+
+def _row_spacing(recording: Recording) -> Iterator[Finding]:
+    """Yield where rows have no times of their own, and what stands for them is a guess or told from readings."""
+    off = max((_rate_share(sheet) for sheet in recording.sheets.values()), default=0.0)
+    if off > RATE:
+        yield Finding(
+            "sensors.row_spacing",
+            "warning",
+            "[sensors]",
+            f"rate_hz is stated to be off by {100 * off:.2g} % (one sd): no column of the log tells the times of rows",
+            f"{100 * RATE:g} %, as parts are",
+            "spin rates are off by as much, and lengths told from an acceleration by twice that; where the step is "
+            "known, write step_s into the map of the import, without step_sigma_s",
+        )
+
+
+def _rate_share(sheet: SensorSheet) -> float:
+    """Return what share of itself a sensor's rate is stated to be off by, one sigma."""
+    return float(np.max(sheet.sigma.get("rate_hz", 0.0))) / sheet.rate_hz if sheet.rate_hz else 0.0

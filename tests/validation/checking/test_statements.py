@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from discsim.disc import Aero, AeroTable, Disc
+from discsim.environment import Environment
 from discsim.files import model_names
+from discsim.recording import Recording, Samples
+from discsim.sensor_sheet import SensorSheet
 from discsim.shipped import load_disc
-from discsim.validation.checking.statements import unlikely_flight
+from discsim.validation.checking.statements import statement_findings, unlikely_flight
 
 DRIVER, THERE = load_disc("driver")
 AERO = DRIVER.aero or Aero()
@@ -94,3 +97,27 @@ def test_nothing_is_said_of_a_shipped_disc(name: str):
 def test_nothing_is_said_of_slopes_where_none_are_stated():
     body = Disc(0.175, 0.21, 6e-4, 1.15e-3, Aero())
     assert unlikely_flight(body, THERE) == []
+
+
+@pytest.mark.parametrize("share", [0.7, 0.04, 0.01])
+def test_times_of_rows_that_are_a_guess_are_told_beyond_what_parts_are_off_by(share: float):
+    """A log without times, taken as 100 rows a second where it had 200: lengths came out with a sd of microns."""
+    rows = Samples(np.arange(10) * 0.01, np.zeros((10, 3)))
+    sheet = SensorSheet(rate_hz=100.0, sigma={"rate_hz": np.array(100.0 * share)})
+    guessed = Recording(
+        plant="free_spin",
+        name="guessed",
+        environment=Environment(magnetic_field=np.array([20.0, 0.0, 40.0])),
+        samples={"accelerometer": rows},
+        sheets={"accelerometer": sheet},
+    )
+    said = [finding.sentence for finding in statement_findings(guessed) if finding.id == "sensors.row_spacing"]
+    if share <= 0.01:
+        assert not said
+        return
+    off = f"rate_hz is stated to be off by {100 * share:.2g} % (one sd): no column of the log tells the times of rows"
+    assert said == [
+        f"[sensors]: {off}; expected 1 %, as parts are; spin rates are off by as much, and lengths told from an "
+        "acceleration by twice that; where the step is known, write step_s into the map of the import, without "
+        "step_sigma_s"
+    ]
