@@ -22,7 +22,6 @@ __all__ = [
     "field_size",
     "gravity_norm",
     "gyroscope_unit",
-    "in_shares",
     "magnetometer_unit",
     "rest_norm",
 ]
@@ -56,6 +55,10 @@ PER_UT = {
     "MMC5983 at 18 bit": 163.84,
     "IST8310": 1 / 0.3,
 }
+#: With whole numbers of what drivers give in the place of counts, where the field tells which.
+PER_UT_READ = {**PER_UT, "magnetometer read in mgauss": 10.0, "magnetometer read in nT": 1000.0}
+#: Ranges of a part lie a factor of 4/3 apart and more (LIS3MDL at 12 and 16 G): nearer than half of that tells which.
+APART = (4 / 3) ** 0.5
 #: No rate gyroscope that a log of motion holds shows more than 100 rad/s (5730 deg/s; the widest common part has 4000).
 LARGEST_RAD_S = 100.0
 #: What headers state in each other's place: most drivers give one of them, and an example of the other is copied.
@@ -66,26 +69,83 @@ _RAD = np.pi / 180
 
 
 class Shares(NamedTuple):
-    """Readings that are shares of the field: their size, and what was taken for it."""
+    """A magnetometer's readings that are shares of the field: their size, and what was taken for it."""
 
     size: float
     what: str
+
+    def unit(self, field: float | None = None) -> Unit:
+        """Return their unit in a ``field``, uT; None where that is not known."""
+        why = (
+            f"no unit in the header; {self.size:.4g} ({self.what}) is the earth's field in none, but that of readings "
+            "which were calibrated to the field's size"
+        )
+        if field is not None:
+            sure: Sureness = "likely"
+            why = f"{why}: that of the place is taken"
+        else:
+            sure = "guess"
+            why = f"{why}; how large that was is open: give --place and --date, or write it as scale"
+        scale = float(f"{field or MIDDLE:.4g}")
+        told = _said("magnetometer", f"shares of a field of {scale:g} uT", sure, why)
+        return Unit("uT", scale, told, self)
+
+
+class Counts(NamedTuple):
+    """A magnetometer's readings that are whole numbers: their size, and what was taken for it."""
+
+    size: float
+    what: str
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """The parts of which so many counts are the earth's field, with their counts per uT."""
+        return {part: per for part, per in PER_UT.items() if FIELD[0] <= self.size / per <= FIELD[1]}
+
+    def unit(self, field: float | None = None) -> Unit:
+        """Return their unit in a ``field``, uT; None where that is not known: then about the middle of the earth's."""
+        if field is None:
+            fits = self.parts
+            if not fits and FIELD_WITH_IRON[0] <= 1e-3 * self.size <= FIELD_WITH_IRON[1]:
+                why = f"{self.size:.4g} ({self.what}) is the earth's field with iron near the sensor"
+                why += ", and no part counts so finely"
+                return Unit("nT", 1.0, _said("magnetometer", "nT", "guess", why), self)
+        else:
+            fits = {part: per for part, per in PER_UT_READ.items() if self._off(per, field) < np.log(APART)}
+        known = fits or PER_UT
+        part = min(known, key=lambda part: self._off(known[part], field or MIDDLE))
+        per = known[part]
+        others = ", ".join(other for other in fits if other != part)
+        sure: Sureness = "likely" if len(fits) == 1 else "guess"
+        why = f"whole numbers; of a {part} {self.size:.0f} ({self.what}) would be {self.size / per:.0f} uT"
+        why += "" if field is None else f", and the field of the place is of {field:.0f} uT"
+        why += f"; it may be a {others} as well" if others else ""
+        why += ": --place and --date would tell" if others and field is None else ""
+        return Unit("uT", 1 / per, _said("magnetometer", f"{1 / per:.4g} uT a count", sure, why), self)
+
+    def _off(self, per: float, field: float) -> float:
+        """Return how far ``per`` counts per uT are from a field, on a logarithmic scale."""
+        return float(abs(np.log(self.size / per / field)))
 
 
 class Unit(NamedTuple):
     """A unit of the map and the worth of one reading in it, as `[sensors.NAME]` writes them, and the decision.
 
-    ``shares`` are a magnetometer's readings that are shares of the field, None for any other.
+    ``open`` is what a magnetometer reads where the size of the field at its place tells the worth of a reading.
     """
 
     unit: str
     scale: float
     decision: Decision
-    shares: Shares | None = None
+    open: Shares | Counts | None = None
 
     def factor(self, sensor_unit: str) -> float:
         """Return what turns a reading into the recording's unit."""
         return UNITS[sensor_unit][self.unit] * self.scale
+
+    def in_field(self, field: float | None) -> Unit:
+        """Return it at a place with a ``field`` of so many uT; as it is where that is not known."""
+        return self if self.open is None or field is None else self.open.unit(field)
 
 
 def rest_norm(value: FloatArray) -> float:
@@ -207,53 +267,16 @@ def magnetometer_unit(value: FloatArray, stated: Reading | None, *, counts: bool
     if fits and not counted and not (_whole(value) and (counts or fits[0] == "nT")):
         why = f"{size:.4g} ({what}) is the earth's field"
         return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
-    if fits == ["nT"] and not counted and not _parts_of(size):
+    if fits == ["nT"] and not counted and not Counts(size, what).parts:
         why = f"{size:.4g} ({what}) is the earth's field, and no part counts so finely"
         return Unit("nT", 1.0, _said(name, "nT", "likely", why))
     if _whole(value):
-        return _magnetometer_counts(size, what)
+        return Counts(size, what).unit()
     if SHARES[0] <= size <= SHARES[1] and not counted:
-        return in_shares(Shares(size, what))
+        return Shares(size, what).unit()
     unit = min(factors, key=lambda unit: abs(np.log(max(size, 1e-12) * factors[unit] / MIDDLE)))
     why = f"no unit in the header; {size:.4g} ({what}) is nearest to the earth's field in it"
     return Unit(unit, 1.0, _said(name, unit, "guess", why))
-
-
-def in_shares(shares: Shares, field: float | None = None) -> Unit:
-    """Return the unit of a magnetometer whose readings are shares of a ``field``, uT; None where that is not known."""
-    why = (
-        f"no unit in the header; {shares.size:.4g} ({shares.what}) is the earth's field in none, but that of readings "
-        "which were calibrated to the field's size"
-    )
-    if field is not None:
-        sure: Sureness = "likely"
-        why = f"{why}: that of the place is taken"
-    else:
-        sure = "guess"
-        why = f"{why}; how large that was is open: give --place and --date, or write it as scale"
-    scale = float(f"{field or MIDDLE:.4g}")
-    told = _said("magnetometer", f"shares of a field of {scale:g} uT", sure, why)
-    return Unit("uT", scale, told, shares)
-
-
-def _parts_of(size: float) -> dict[str, float]:
-    """Return the parts of which so many counts are the earth's field, with their counts per uT."""
-    return {part: per for part, per in PER_UT.items() if FIELD[0] <= size / per <= FIELD[1]}
-
-
-def _magnetometer_counts(size: float, what: str) -> Unit:
-    fits = _parts_of(size)
-    if not fits and FIELD_WITH_IRON[0] <= 1e-3 * size <= FIELD_WITH_IRON[1]:
-        why = f"{size:.4g} ({what}) is the earth's field with iron near the sensor, and no part counts so finely"
-        return Unit("nT", 1.0, _said("magnetometer", "nT", "guess", why))
-    part = min(fits or PER_UT, key=lambda part: abs(np.log(size / PER_UT[part] / MIDDLE)))
-    per = PER_UT[part]
-    others = ", ".join(other for other in fits if other != part)
-    sure: Sureness = "likely" if len(fits) == 1 else "guess"
-    why = f"whole numbers; of a {part} {size:.0f} ({what}) would be {size / per:.0f} uT"
-    why += f"; it may be a {others} as well" if others else ""
-    text = f"{1 / per:.4g} uT a count"
-    return Unit("uT", 1 / per, _said("magnetometer", text, sure, why))
 
 
 def gyroscope_unit(

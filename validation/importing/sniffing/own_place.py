@@ -34,13 +34,14 @@ _FIRST = datetime(1970, 1, 1, tzinfo=UTC)
 class OwnPlace(NamedTuple):
     """Latitude and longitude, degrees north and east, and the names of their columns; the day where that is known.
 
-    It is the day of a log whose stamps are dates, where a model tells the field of that day.
+    It is the day of a log whose stamps are dates, where a model tells the ``field`` of that day, of so many uT.
     """
 
     latitude: float
     longitude: float
     names: tuple[str, str]
     day: date | None = None
+    field: float | None = None
 
     @property
     def text(self) -> str:
@@ -53,10 +54,10 @@ class OwnPlace(NamedTuple):
             return self
         day = (_FIRST + timedelta(seconds=moment)).date()
         try:
-            world_magnetic_field(self.latitude, self.longitude, day)
+            there = world_magnetic_field(self.latitude, self.longitude, day)
         except InputError:
             return self
-        return self._replace(day=day)
+        return self._replace(day=day, field=float(np.linalg.norm(there)))
 
     @property
     def note(self) -> str:

@@ -16,7 +16,7 @@ from discsim.validation.importing.sniffing.clock import Clock
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.fixes import ProposedFixes
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
-from discsim.validation.importing.sniffing.magnitudes import Unit, in_shares
+from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.own_place import OwnPlace
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
@@ -76,11 +76,8 @@ class Proposal:
         ]
 
     def in_field(self, size: float | None) -> Proposal:
-        """Return it with what a magnetometer reads as shares of the field worth a field of ``size`` uT; None: open."""
-        sensors = tuple(
-            one if one.unit.shares is None else replace(one, unit=in_shares(one.unit.shares, size))
-            for one in self.sensors
-        )
+        """Return it with the unit of a magnetometer that a field of ``size`` uT tells; as it is for None."""
+        sensors = tuple(replace(one, unit=one.unit.in_field(size)) for one in self.sensors)
         return replace(self, sensors=sensors)
 
 

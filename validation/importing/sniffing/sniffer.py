@@ -128,7 +128,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     proposal = _proposal(sniffed, clock, {})
     if offsets := _offsets(proposal, own, found):
         proposal = _proposal(sniffed, clock, offsets)
-    proposal = replace(proposal, fixes=fixed, place=place)
+    proposal = replace(proposal, fixes=fixed, place=place).in_field(place and place.field)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
     return _with_unused(proposal, tables, named, own)
 
