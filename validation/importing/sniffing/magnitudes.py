@@ -38,8 +38,8 @@ MIDDLE = 45.0
 SHARES = (0.67**0.5, 0.67**-0.5)
 #: Counts per g of usual parts: 16 bits over 2, 4, 8, 16 g; 12, 10 and 8 bits of older parts. A factor of 2 apart.
 PER_G = (16384.0, 8192.0, 4096.0, 2048.0, 1024.0, 512.0, 256.0, 64.0)
-#: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch) and 245 to 4000 deg/s (ST).
-PER_DEG_S = (131.072, 65.536, 32.768, 16.384, 8.192, 114.286, 57.143, 28.571, 14.286, 7.143)
+#: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch), 245 to 4000 deg/s (ST), and of an ITG-3200.
+PER_DEG_S = (131.072, 65.536, 32.768, 16.384, 8.192, 114.286, 57.143, 28.571, 14.286, 7.143, 14.375)
 #: Counts per uT: AK8963 (16, 14 bit), LIS3MDL at 4 to 16 G, HMC5883L, QMC5883L (2, 8 G), MMC5983 (16, 18 bit), IST8310.
 PER_UT = {
     "AK8963": 1 / 0.15,
@@ -206,9 +206,11 @@ def accelerometer_unit(value: FloatArray, stated: Reading | None) -> Unit:
         sure: Sureness = "likely" if fits == "mg" else "certain"
         return Unit(fits, 1.0, _said(name, fits, sure, f"{rest:.4g} at rest is gravity"))
     per_g = min(PER_G, key=lambda counts: abs(np.log(rest / counts)) if rest > 0 else 1.0)
-    if _whole(value) and abs(rest / per_g - 1) < REST:
-        why = f"whole numbers, {rest:.0f} of them at rest: counts of a part with {per_g:.0f} per g"
-        return Unit("g", 1 / per_g, _said(name, f"1/{per_g:.0f} g a count", "likely", why))
+    if abs(rest / per_g - 1) < REST:
+        whole = _whole(value)
+        why = f"{'whole' if whole else 'averaged or calibrated'} numbers, {rest:.0f} of them at rest"
+        why += f": counts of a part with {per_g:.0f} per g"
+        return Unit("g", 1 / per_g, _said(name, f"1/{per_g:.0f} g a count", "likely" if whole else "guess", why))
     why = f"no unit in the header, and {rest:.4g} where it is quietest is no gravity in any usual unit"
     return Unit("m/s^2", 1.0, _said(name, "m/s^2", "guess", why))
 
@@ -319,18 +321,18 @@ def gyroscope_unit(
         return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
     if near is not None and stated is None and (clock == "certain" or near not in ASKED_FOR):
         return Unit(near, 1.0, _said(name, near, "likely", f"{by} turns as fast in this unit"))
-    if _whole(value) and (peak > 5000 or stated is not None):
-        return _gyroscope_counts(turned, by)
+    if (_whole(value) and (peak > 5000 or stated is not None)) or peak * _RAD > LARGEST_RAD_S:
+        return _gyroscope_counts(turned, by, "whole numbers" if _whole(value) else "beyond any gyroscope in deg/s")
     return _by_size(value, peak)
 
 
-def _gyroscope_counts(turned: float | None, by: str) -> Unit:
+def _gyroscope_counts(turned: float | None, by: str, told: str) -> Unit:
     name = "gyroscope"
     if turned is not None:
         per = min(PER_DEG_S, key=lambda per: abs(np.log(turned / (_RAD / per))))
-        why = f"whole numbers; by the turning of {by} one count is 1/{_RAD / turned:.4g} deg/s"
+        why = f"{told}; by the turning of {by} one count is 1/{_RAD / turned:.4g} deg/s"
         return Unit("deg/s", 1 / per, _said(name, f"1/{per:.5g} deg/s a count", "likely", why))
-    why = "whole numbers; taken as 16 bits over 2000 deg/s, the usual range of a fast motion"
+    why = f"{told}; taken as 16 bits over 2000 deg/s, the usual range of a fast motion"
     return Unit("deg/s", 1 / 16.384, _said(name, "1/16.384 deg/s a count", "guess", why))
 
 

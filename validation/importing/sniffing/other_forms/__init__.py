@@ -12,6 +12,7 @@ from pathlib import Path
 from discsim.validation.importing.sniffing.other_forms import (
     array_file,
     database,
+    framed_lines,
     html_tables,
     json_records,
     line_protocol,
@@ -33,6 +34,7 @@ _FORMS = (
     line_protocol,
     value_rows,
     teleplot,
+    framed_lines,
     quoted_cells,
     unit_cells,
 )

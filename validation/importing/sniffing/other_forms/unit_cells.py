@@ -1,6 +1,7 @@
 """Numbers with their unit in the same cell (`9.81 m/s^2`, `12ms`), as people print them: the units moved to the header.
 
-Takes a table with a line of names; each column must have one unit, or none, in all its first cells.
+Takes a table with a line of names or without; each column must have one unit, or none, in all its first cells. Where
+there are no names, the units are all that tells the sensors.
 """
 
 from __future__ import annotations
@@ -36,22 +37,28 @@ def begins(path: Path) -> bool:
 
 
 class _Layout(NamedTuple):
-    """How a table is written, and the unit of each column, empty where it has none."""
+    """How a table is written, the unit of each column (empty where it has none), and whether it has a line of names."""
 
     encoding: str
     separator: str
     units: tuple[str, ...]
+    named: bool
 
 
 def _layout(path: Path) -> _Layout | None:
     """Return how a table with units in its cells is written; None where this is none."""
     for encoding, separator, rows in first_rows(path):
         if len(rows) > _FEWEST and len(rows[0]) >= _COLUMNS:
-            units = [_unit([row[k] for row in rows[1:]]) for k in range(len(rows[0]))]
-            names = not any(_PLAIN.fullmatch(cell) or _CELL.fullmatch(cell) for cell in rows[0])
-            if names and sum(bool(unit) for unit in units) >= _COLUMNS:
-                return _Layout(encoding, separator, tuple(unit or "" for unit in units))
+            named = not any(map(_number, rows[0]))
+            units = [_unit([row[k] for row in rows[named:]]) for k in range(len(rows[0]))]
+            if sum(bool(unit) for unit in units) >= _COLUMNS and (named or all(map(_number, rows[0]))):
+                return _Layout(encoding, separator, tuple(unit or "" for unit in units), named)
     return None
+
+
+def _number(cell: str) -> bool:
+    """Tell whether a cell is a number, with a unit or without, or empty."""
+    return _PLAIN.fullmatch(cell) is not None or _CELL.fullmatch(cell) is not None
 
 
 def _unit(cells: Sequence[str]) -> str | None:
@@ -71,7 +78,8 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     layout = _layout(raw)
     if layout is None:
         raise InputError.at(raw, None, "has no units in its cells any more; expected the file that it was")
-    names, *rows = all_rows(raw, layout.encoding, layout.separator)
+    rows = all_rows(raw, layout.encoding, layout.separator)
+    names = rows.pop(0) if layout.named else [f"c{k + 1}" for k in range(len(layout.units))]
     named = zip(names, layout.units, strict=True)
     header = [f"{name.strip()} ({unit})" if unit else name.strip() for name, unit in named]
     moved = [list(map(_bare, row, chain(layout.units, repeat("")))) for row in rows]

@@ -18,6 +18,7 @@ __all__ = [
     "all_rows",
     "check_size",
     "comma_separated",
+    "encoding_of",
     "first_bytes",
     "first_rows",
     "holds_log",
@@ -59,7 +60,7 @@ def first_rows(path: Path) -> Iterator[tuple[str, str, list[list[str]]]]:
     head = first_bytes(path, _HEAD)
     if b"\0" in head:
         return
-    encoding = _encoding(head)
+    encoding = encoding_of(head)
     lines = [line for line in _ENDS.split(head.decode(encoding, "replace"))[:-1] if line.strip()][: FIRST_ROWS + 1]
     for separator in ";\t|,":
         try:
@@ -70,7 +71,7 @@ def first_rows(path: Path) -> Iterator[tuple[str, str, list[list[str]]]]:
             yield encoding, separator, rows
 
 
-def _encoding(head: bytes) -> str:
+def encoding_of(head: bytes) -> str:
     """Return UTF-8 where the whole lines of a beginning are that, else Windows' Latin-1: units have degree signs."""
     try:
         head[: head.rfind(b"\n")].decode("utf-8")
