@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, made_log
@@ -97,11 +96,3 @@ def test_cells_with_units_need_no_line_of_names(tmp_path):
     rows = (", ".join(map(str.__add__, cells(k), units)) for k in range(LOG.t.size))
     raw.write_text("\n".join([*rows, ""]))
     assert_read(import_log(raw))
-
-
-def test_counts_of_an_older_gyroscope_are_told_by_the_turning_of_the_field(tmp_path):
-    raw = tmp_path / "log.csv"
-    rows = np.column_stack([1000 * LOG.t, LOG.accel, np.round(LOG.gyro / DEG * 14.375), LOG.mag])
-    np.savetxt(raw, rows, "%.4f", ",", header="t_ms,ax,ay,az,gx,gy,gz,mx,my,mz", comments="")
-    (unit,) = [one for one in import_log(raw).decisions if one.what == "gyroscope unit"]
-    assert unit.choice == "1/14.375 deg/s a count"

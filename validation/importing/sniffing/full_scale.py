@@ -16,7 +16,7 @@ from discsim.validation.importing.sniffing.spin_axis import Reading3
 
 __all__ = ["full_scale"]
 
-#: What 16 bits span at the counts of usual parts, deg/s: 250 to 4000, 287 to 4587, and 2280 of an ITG-3200.
+#: What 16 bits span at the counts of usual parts, deg/s: 250 to 4000, and 287 to 4587.
 FULL_SCALES = np.array(sorted(2.0**15 / per for per in PER_DEG_S))
 #: Steps of resolution within which a full scale is met, as of a stated range: 16 bits end a step below it.
 MET = 1.5

@@ -38,8 +38,8 @@ MIDDLE = 45.0
 SHARES = (0.67**0.5, 0.67**-0.5)
 #: Counts per g of usual parts: 16 bits over 2, 4, 8, 16 g; 12, 10 and 8 bits of older parts. A factor of 2 apart.
 PER_G = (16384.0, 8192.0, 4096.0, 2048.0, 1024.0, 512.0, 256.0, 64.0)
-#: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch), 245 to 4000 deg/s (ST), and of an ITG-3200.
-PER_DEG_S = (131.072, 65.536, 32.768, 16.384, 8.192, 114.286, 57.143, 28.571, 14.286, 7.143, 14.375)
+#: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch) and 245 to 4000 deg/s (ST).
+PER_DEG_S = (131.072, 65.536, 32.768, 16.384, 8.192, 114.286, 57.143, 28.571, 14.286, 7.143)
 #: Counts per uT: AK8963 (16, 14 bit), LIS3MDL at 4 to 16 G, HMC5883L, QMC5883L (2, 8 G), MMC5983 (16, 18 bit), IST8310.
 PER_UT = {
     "AK8963": 1 / 0.15,

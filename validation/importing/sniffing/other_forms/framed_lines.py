@@ -21,6 +21,7 @@ from discsim.validation.importing.sniffing.other_forms.written import (
     encoding_of,
     first_bytes,
 )
+from discsim.validation.importing.vectornav import BEGINS
 
 __all__ = ["begins", "write_tables"]
 
@@ -76,9 +77,12 @@ def _frame(path: Path) -> _Frame | None:
 
 
 def _taken_off(line: str) -> tuple[_Frame, str] | None:
-    """Return the frame of a line of numbers, and the line without it; None where it has none, or no numbers."""
+    """Return the frame of a line of numbers, and the line without it; None where it has none, or no numbers.
+
+    VectorNav's sentences are read by their names, with their checksums.
+    """
     text = line if (begun := stamped(line)) is None else begun[2]
-    match = _LINE.fullmatch(text)
+    match = None if text.startswith(BEGINS) else _LINE.fullmatch(text)
     if match is None:
         return None
     before, middle, behind = match[1] or "", match[2], match[3] or ""
