@@ -119,3 +119,12 @@ def test_parts_of_a_second_beside_its_count_go_on(tmp_path, name, per):
 def test_what_vernier_puts_before_a_name_hides_no_axis(name, axis, sensor):
     found = read_name(name)
     assert (found.axis, sensor_of(found.base)) == (axis, sensor)
+
+
+@pytest.mark.parametrize(("gravity", "sensors"), [(0.0, 3), (G0, 2)])
+def test_an_acceleration_that_is_called_linear_and_rests_on_gravity_is_a_reading(tmp_path, gravity, sensors):
+    """ "Ang Vel X" and "Lin Acc X" were left out as worked out from other readings: the field stood alone."""
+    columns = [("Time", LOG.t), *three([f"Ang Vel {axis}" for axis in "XYZ"], LOG.gyro)]
+    columns += three([f"Lin Acc {axis}" for axis in "XYZ"], LOG.accel + np.array([0.0, 0.0, gravity]))
+    columns += three([f"Mag Field {axis}" for axis in "XYZ"], LOG.mag)
+    assert len(import_log(write_table(tmp_path / "log.csv", columns)).recordings[0].samples) == sensors

@@ -9,8 +9,10 @@ from typing import NamedTuple
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 
 __all__ = [
+    "NO_READING",
     "Name",
     "foreign_words",
+    "is_called_linear",
     "is_of_mavlink",
     "is_spacing_name",
     "is_time_name",
@@ -69,8 +71,11 @@ _STAND_BACK = {
     2: "uncal uncalibrated unfilt debug 2 second motion",
     1: "filt filtered lpf",
 }
+#: A column that stands this far back is no sensor's reading.
+NO_READING = 9
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
-_AS_READ = ("angular_velocity", "angular velocity", "linear_acceleration")
+_AS_READ = re.compile(r"\bang(?:ular)?[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
+_LINEAR = {"lin", "linear"}
 _TIME_STEMS = (
     "time zeit temps tiempo tempo tijd czas cas czas tid aika zaman vreme время час 时间 時間 시간 timestamp stamp "
     "seconds millis micros elapsed clock epoch uhrzeit datum date"
@@ -198,11 +203,22 @@ def sensor_of(base: str) -> str | None:
 
 def penalty_of(base: str) -> int:
     """Return how far a column stands back behind the plain sensor's: words of what was worked out from it."""
-    plain = _plain(base)
-    for name in _AS_READ:
-        plain = plain.replace(name, "")
-    words = set(re.split(r"[\s_\-.()]+", plain))
+    words = _words_beside(base)
     return sum(weight for weight, listed in _STAND_BACK.items() for word in listed.split() if word in words)
+
+
+def _words_beside(base: str) -> set[str]:
+    """Return the words of a name but those that are read as they are."""
+    return set(re.split(r"[\s_\-.()]+", _AS_READ.sub("", _plain(base))))
+
+
+def is_called_linear(base: str) -> bool:
+    """Tell whether a name says of an acceleration that it is linear: mostly, but not always, one without gravity.
+
+    >>> is_called_linear("Lin Acc"), is_called_linear("acc")
+    (True, False)
+    """
+    return not _LINEAR.isdisjoint(_words_beside(base))
 
 
 def timeless(name: str) -> str:

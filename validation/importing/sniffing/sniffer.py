@@ -13,7 +13,6 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.files import model_names
 from discsim.recording import SENSORS, Plant
-from discsim.validation.importing.import_map import G0
 from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
@@ -33,19 +32,16 @@ from discsim.validation.importing.sniffing.exchanged import exchanged
 from discsim.validation.importing.sniffing.fixes import fixes_of
 from discsim.validation.importing.sniffing.full_scale import full_scale
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
+from discsim.validation.importing.sniffing.held_gravity import linear_with_gravity, rests, weightless
 from discsim.validation.importing.sniffing.late_clock import late_clock, moved
 from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import (
-    PER_G,
-    REST,
     Unit,
     accelerometer_unit,
-    gravity_norm,
     gyroscope_unit,
     magnetometer_unit,
-    rest_norm,
 )
-from discsim.validation.importing.sniffing.names import is_time_name, sensor_of, timeless
+from discsim.validation.importing.sniffing.names import NO_READING, is_time_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
 from discsim.validation.importing.sniffing.own_place import own_place
 from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
@@ -74,8 +70,6 @@ ORDER = ("gyroscope", "accelerometer", "magnetometer")
 #: A log rests on gravity where its rate is below this, rad/s, in more than this share of its rows: `gravity_norm` looks
 #: for what most windows share, and a rest of a twentieth of a spin is what `rest_norm` takes.
 SLOW, RESTS = 1.0, 0.05
-#: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
-NO_READING = 9
 #: Steps of rows that are tried, over the one that is guessed (0.01 s): 10 to 1000 rows a second, each within a factor
 #: of two of the next, as far as a search goes from it.
 FACTORS = tuple(np.geomspace(0.1, 10.0, 9).tolist())
@@ -223,11 +217,12 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
     alive = [triple for triple in triples if not _dead(triple)]
     for sensor in ORDER:
         mine = [t for t in alive or triples if t.sensor == sensor and t.penalty < NO_READING]
+        mine = mine or [t for t in alive if t.sensor == sensor == "accelerometer" and linear_with_gravity(t)]
         if not mine:
             continue
         # of several the one with gravity in it, then the plainest name, then the first
         named[sensor] = min(
-            mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t))
+            mine, key=lambda t: (sensor == "accelerometer" and weightless(t), t.penalty, triples.index(t))
         )
     wider = {sensor: wider_range(first, _like(first, alive)) for sensor, first in named.items()}
     named |= {sensor: item[0] for sensor, item in wider.items() if item is not None}
@@ -236,7 +231,7 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
     said |= {decision.what: decision for decision in decisions}
     accel = meant.get("accelerometer")
     several = sum(t.sensor == "accelerometer" and t.penalty < NO_READING for t in triples) > 1
-    if accel is not None and _weightless(accel) and (several or not _rests(accel)):
+    if accel is not None and weightless(accel) and (several or not rests(accel)):
         del meant["accelerometer"], named["accelerometer"]  # no sensor's reading, and nothing here could use it
     found = {
         sensor: (triple, said.get(sensor) or Decision(sensor, triple.label, "certain", f"{triple.source} says so"))
@@ -248,7 +243,7 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
 def _like(first: Triple, triples: Sequence[Triple]) -> list[Triple]:
     """Return the others of a triple's kind that are a sensor's readings."""
     alike = [t for t in triples if t is not first and t.sensor == first.sensor and t.penalty < NO_READING]
-    return [t for t in alike if t.sensor != "accelerometer" or not _weightless(t)]
+    return [t for t in alike if t.sensor != "accelerometer" or not weightless(t)]
 
 
 def _turned_about(
@@ -285,28 +280,6 @@ def _dead(triple: Triple) -> bool:
     return value.size == 0 or bool(np.ptp(value) == 0)
 
 
-def _weightless(triple: Triple) -> bool:
-    """Tell an acceleration with gravity taken off: at rest it is nothing, below a fiftieth of its largest.
-
-    A steady spin is as quiet as a rest, so a fifth of the windows of 16 rows will do, if none rests on gravity.
-    """
-    value = triple.values[np.isfinite(triple.values).all(axis=1)]
-    nothing = 0.02 * float(np.linalg.norm(value, axis=1).max())
-    if rest_norm(value) < nothing:
-        return True
-    count = len(value) // 16
-    means = np.linalg.norm(value[: count * 16].reshape(count, 16, 3).mean(axis=1), axis=1)
-    return count > 0 and not _rests(triple) and bool(np.mean(means < nothing) > 0.2)
-
-
-def _rests(triple: Triple) -> bool:
-    """Tell whether most steady readings are gravity in a usual unit, or in counts, as on a launch pad."""
-    value = triple.values[np.isfinite(triple.values).all(axis=1)]
-    counts = PER_G if np.array_equal(value, np.round(value)) else ()
-    shared = gravity_norm(value)
-    return any(abs(shared / one - 1) < REST for one in (G0, 1.0, 1000.0, *counts))
-
-
 def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -> list[tuple[Triple, str]]:
     """Return the triples that are a sensor's and are left out, each with a line that says why."""
     notes = []
@@ -317,7 +290,7 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
         if _dead(triple):
             number = float(np.nanmax(triple.values, initial=-np.inf))
             why = f"all its rows are {f'{number:.9g}' if number else 'zero'}: it was not connected or not read"
-        elif triple.sensor == "accelerometer" and (triple.penalty >= NO_READING or _weightless(triple)):
+        elif triple.sensor == "accelerometer" and (triple.penalty >= NO_READING or weightless(triple)):
             why = "worked out from other readings, or without gravity"
         else:
             why = "a second one" if triple.sensor in found else "worked out from other readings"

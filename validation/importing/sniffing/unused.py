@@ -15,7 +15,7 @@ import numpy as np
 
 from discsim.validation.importing.import_map import UNITS
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers
-from discsim.validation.importing.sniffing.names import penalty_of, read_name, sensor_of
+from discsim.validation.importing.sniffing.names import NO_READING, penalty_of, read_name, sensor_of
 from discsim.validation.importing.sniffing.units import COUNTS, readings_of
 
 __all__ = ["missing_axes", "one_axis_rate", "unused_columns"]
@@ -24,8 +24,6 @@ __all__ = ["missing_axes", "one_axis_rate", "unused_columns"]
 MOST_NAMES, MOST_FILES = 60, 6
 #: What the reader puts behind a name that stands in the header for the second time.
 _AGAIN = re.compile(r"\.\d+$")
-#: A column that stands this far back (worked out from readings) is no sensor's.
-NO_READING = 9
 #: How the names of sensors begin in logs, in full and cut off: a name that is a slip away from one may mean it.
 _SPELLINGS = {
     "gyroscope": ("gyr", "gyro", "gyros", "gyroscope"),
