@@ -82,7 +82,7 @@ def test_sensors_in_turn_behind_a_mark_are_records(tmp_path):
     assert_allclose(found.recordings[0].samples["accelerometer"].value, LOG.accel, atol=1e-2)
 
 
-@pytest.mark.parametrize("line", ["gx:1.0 gy:2.0 gz:3.0", "Accel: 0.1, 0.2, 9.8", "0.1,0.2,9.8,1.0"])
+@pytest.mark.parametrize("line", ["gx:1.0 gy:2.0 gz:3.0", "Accel: 0.1, 0.2, 9.8", "0.1,0.2,9.8,1.0", "1;2;3;4;"])
 def test_names_before_cells_and_plain_rows_are_no_frame(tmp_path, line):
     raw = tmp_path / "log.txt"
     raw.write_text(f"{line}\n" * 40)

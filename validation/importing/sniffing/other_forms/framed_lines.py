@@ -25,10 +25,9 @@ from discsim.validation.importing.vectornav import BEGINS
 
 __all__ = ["begins", "write_tables"]
 
-#: Marks before a line and behind it, there also with a checksum as of NMEA's sentences (`*5A`).
-_BEFORE = r"[$<{*!#@%&~^>]+"
-_BEHIND = r"\*[0-9A-Fa-f]{2}|[>}*;!#$&%@~^]+"
-_LINE = re.compile(rf"\s*({_BEFORE})?\s*(.*?)\s*({_BEHIND})?\s*")
+#: Marks before a line and behind it; there also a checksum as of NMEA's sentences (`*5A`).
+_BEFORE, _BEHIND = "$<{*!#@%&~^>", ">}*;!#$&%@~^"
+_CHECKSUM = re.compile(r"\*[0-9A-Fa-f]{2}")
 #: A name before all of a line's numbers: `IMU: 1,2,3`.
 _NAME = re.compile(r"[^\W\d][^,;:=\t|]*[:=]\s*")
 _PARTS = re.compile(r"\s*[,;\t|]\s*|\s+")
@@ -81,11 +80,16 @@ def _taken_off(line: str) -> tuple[_Frame, str] | None:
 
     VectorNav's sentences are read by their names, with their checksums.
     """
-    text = line if (begun := stamped(line)) is None else begun[2]
-    match = None if text.startswith(BEGINS) else _LINE.fullmatch(text)
-    if match is None:
+    begun = stamped(line)
+    text = (line if begun is None else begun[2]).strip()
+    if text.startswith(BEGINS):
         return None
-    before, middle, behind = match[1] or "", match[2], match[3] or ""
+    inner = text.lstrip(_BEFORE)
+    before = text[: len(text) - len(inner)]
+    behind = inner[-3:] if _CHECKSUM.fullmatch(inner[-3:]) else inner[len(inner.rstrip(_BEHIND)) :]
+    middle = inner.removesuffix(behind).strip()
+    if behind == ";" and ";" in middle:
+        behind = ""  # a separator behind the last cell
     middle = _OF_RAZOR.sub(lambda razor: f"{_RAZOR[razor[1]]}{' raw' * (razor[2] == 'R')}: ", middle)
     name = found[0] if (found := _NAME.match(middle)) is not None else ""
     cells = [cell for cell in _PARTS.split(middle[len(name) :]) if cell]
@@ -97,7 +101,8 @@ def _taken_off(line: str) -> tuple[_Frame, str] | None:
     if not before and not name and (not behind or labelled_cells(middle)):
         return None
     frame = _Frame(before, name, "*" if behind.startswith("*") else behind)
-    return frame, f"{line[: len(line) - len(text)]}{middle[len(name) :]}"
+    stamp = "" if begun is None else line[: len(line) - len(begun[2])]
+    return frame, f"{stamp}{middle[len(name) :]}"
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:
