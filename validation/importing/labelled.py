@@ -29,8 +29,8 @@ _UNITS = (
     "m/s\\^?2|m/s²|m/s/s|rad/s|radians/s|deg/s|degrees/s|°/s|dps|DPS|uT|µT|nT|m?[gG]auss|mG|mg|G|g|ms|us|s|deg ?C|°C|C"
     "|Hz|deg|°|h?Pa|m"
 )
-#: behind a cell comes its unit, perhaps, then what parts it from the next
-_END = rf"(?:\s*({_UNITS})(?=[\s,;|]|$))?(?:[\s,;|]+|$)"
+#: behind a cell comes its unit, perhaps, then what parts it from the next, if not the next one's name
+_END = rf"(?:\s*({_UNITS})(?=[\s,;|]|$))?(?:[\s,;|]+|$|(?=[^\W\d]\w*[:=]))"
 _ONE = re.compile(rf"{_NAME}\s*[:=]\s*({_NUMBER}){_END}")
 #: three numbers behind one name, in brackets or not
 _THREE = re.compile(rf"{_NAME}\s*(?:[:=]\s*)?\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]{_END}")
@@ -77,6 +77,8 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     [('ax (mg)', '1.0'), ('ay (mg)', '2.0'), ('az (mg)', '9.8')]
     >>> labelled_cells(">gx:1627551892437:1.0|dps")
     [('time_ms', '1627551892437'), ('gx (dps)', '1.0')]
+    >>> labelled_cells("X:-0.5Y:1.2Z:9")
+    [('X', '-0.5'), ('Y', '1.2'), ('Z', '9')]
     >>> labelled_cells("Mag (uT) [ 1, 2, 3 ]")
     [('Mag (uT) x', '1'), ('Mag (uT) y', '2'), ('Mag (uT) z', '3')]
     """
