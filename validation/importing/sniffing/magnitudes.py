@@ -269,11 +269,12 @@ def magnetometer_unit(value: FloatArray, stated: Reading | None, *, counts: bool
     if fits and not counted and not (_whole(value) and (counts or fits[0] == "nT")):
         why = f"{size:.4g} ({what}) is the earth's field"
         return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
-    if fits == ["nT"] and not counted and not Counts(size, what).parts:
+    counted_as = Counts(size, what)
+    if fits == ["nT"] and not counted and not counted_as.parts:
         why = f"{size:.4g} ({what}) is the earth's field, and no part counts so finely"
         return Unit("nT", 1.0, _said(name, "nT", "likely", why))
     if _whole(value):
-        return Counts(size, what).unit()
+        return counted_as.unit()
     if SHARES[0] <= size <= SHARES[1] and not counted:
         return Shares(size, what).unit()
     unit = min(factors, key=lambda unit: abs(np.log(max(size, 1e-12) * factors[unit] / MIDDLE)))

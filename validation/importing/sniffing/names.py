@@ -60,10 +60,12 @@ _LETTERS = {
 }
 #: Words before a g that is none of a gyroscope: high_g_x is an accelerometer's of wide range.
 _RANGES = ("high", "low")
+#: A column that stands this far back is no sensor's reading.
+NO_READING = 9
 #: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration
 #: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
 _STAND_BACK = {
-    9: (
+    NO_READING: (
         "lin linear user fe fl ned enu earth world ohne without sans senza gravity err error bias offset setpoint "
         "target std var abs absolute absolutbetrag norm magnitude quat euler roll pitch yaw angle orientation vel "
         "velocity pos delta jerk heading recovery temp"
@@ -71,8 +73,6 @@ _STAND_BACK = {
     2: "uncal uncalibrated unfilt debug 2 second motion",
     1: "filt filtered lpf",
 }
-#: A column that stands this far back is no sensor's reading.
-NO_READING = 9
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
 _AS_READ = re.compile(r"\bang(?:ular)?[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
 _LINEAR = {"lin", "linear"}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -18,8 +18,8 @@ from discsim.validation.importing.sniffing.other_forms.written import (
     FEWEST,
     FIRST_ROWS,
     NUMBER,
-    encoding_of,
-    first_bytes,
+    first_lines,
+    rewrite_lines,
 )
 from discsim.validation.importing.vectornav import BEGINS
 
@@ -62,10 +62,7 @@ def begins(path: Path) -> bool:
 
 def _frame(path: Path) -> _Frame | None:
     """Return the frame of a text's lines; None where they have none."""
-    head = first_bytes(path, 1 << 16)
-    if b"\0" in head:
-        return None
-    lines = head.decode(encoding_of(head), "replace").splitlines()[:-1]
+    _, lines = first_lines(path)
     framed = list(map(_taken_off, islice((line for line in lines if line.strip()), FIRST_ROWS)))
     first = next((k for k, one in enumerate(framed) if one is not None), len(framed))
     frames = Counter(one[0] for one in framed[first:] if one is not None)
@@ -114,16 +111,11 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     frame = _frame(raw)
     if frame is None:
         raise InputError.at(raw, None, "has no framed lines any more; expected the file that it was")
-    try:
-        encoding = encoding_of(first_bytes(raw, 1 << 16))
-        with raw.open(encoding=encoding, errors="replace") as lines, target.open("w", encoding="utf-8") as written:
-            written.writelines(f"{line}\n" for line in _bare(lines, frame))
-    except OSError as error:
-        raise InputError.at(raw, None, f"cannot be read ({error}); expected lines of text") from None
+    rewrite_lines(raw, target, lambda lines: _bare(lines, frame))
     return [f"{raw.name}: its lines stand between marks ({frame.text}); they are taken off"]
 
 
-def _bare(lines: Iterator[str], frame: _Frame) -> Iterator[str]:
+def _bare(lines: Iterable[str], frame: _Frame) -> Iterator[str]:
     """Yield lines without their frame."""
     for line in lines:
         found = _taken_off(line)

@@ -10,14 +10,13 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 
-from discsim.errors import InputError
 from discsim.validation.importing.labelled import stamped
 from discsim.validation.importing.sniffing.names import sensor_of
 from discsim.validation.importing.sniffing.other_forms.written import (
     FIRST_ROWS,
     NUMBER,
-    encoding_of,
-    first_bytes,
+    first_lines,
+    rewrite_lines,
 )
 from discsim.validation.importing.sniffing.units import split_unit
 
@@ -32,16 +31,13 @@ _FEWEST = 4
 
 def begins(path: Path) -> bool:
     """Tell a text in which lines of axes stand below the names of two sensors or more."""
-    head = first_bytes(path, 1 << 16)
-    if b"\0" in head:
-        return False
-    lines = head.decode(encoding_of(head), "replace").splitlines()
+    _, lines = first_lines(path)
     heads = [head for head, _ in islice(_headed(lines), FIRST_ROWS) if head]
     return len(heads) >= _FEWEST and len(set(heads)) > 1
 
 
 def _headed(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Yield each line with the name of the sensor that stands above its axes, empty where none does.
+    """Yield the name of the sensor that stands above a line's axes, empty where none does, and the line with it.
 
     A line of a name alone is not yielded; what a serial monitor put before a line stays there.
     """
@@ -50,7 +46,7 @@ def _headed(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
         begun = stamped(line)
         text = line if begun is None else begun[2]
         if _AXIS.match(text):
-            yield owner, line
+            yield owner, f"{line[: len(line) - len(text)]}{owner} {text.strip()}" if owner else line
             continue
         found = _HEAD.fullmatch(text.strip())
         owner = found[1] if found is not None and sensor_of(split_unit(found[1])[0]) is not None else ""
@@ -64,13 +60,11 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     Raises `InputError` where the file cannot be read.
     """
     named: dict[str, None] = {}
-    try:
-        encoding = encoding_of(first_bytes(raw, 1 << 16))
-        with raw.open(encoding=encoding, errors="replace") as lines, target.open("w", encoding="utf-8") as written:
-            for owner, line in _headed(line.rstrip("\n") for line in lines):
-                text = line if not owner or (begun := stamped(line)) is None else begun[2]
-                written.write(f"{line[: len(line) - len(text)]}{owner}{' ' * bool(owner)}{text.strip()}\n")
-                named |= dict.fromkeys([owner] if owner else [])
-    except OSError as error:
-        raise InputError.at(raw, None, f"cannot be read ({error}); expected lines of text") from None
+
+    def joined(lines: Iterable[str]) -> Iterator[str]:
+        for owner, line in _headed(lines):
+            named.update({owner: None} if owner else {})
+            yield line
+
+    rewrite_lines(raw, target, joined)
     return [f"{raw.name}: the names of its sensors stand above their axes ({', '.join(named)}); put before them"]

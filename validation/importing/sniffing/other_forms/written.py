@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,12 @@ __all__ = [
     "all_rows",
     "check_size",
     "comma_separated",
-    "encoding_of",
     "first_bytes",
+    "first_lines",
     "first_rows",
     "holds_log",
     "read_and_left",
+    "rewrite_lines",
     "write_named",
 ]
 
@@ -52,16 +53,22 @@ def check_size(raw: Path, what: str, most: int) -> None:
         raise InputError.at(raw, None, f"is {what} of {size >> 20} MB; expected at most {most >> 20} MB")
 
 
+def first_lines(path: Path) -> tuple[str, list[str]]:
+    """Return a text's encoding and the whole lines of its beginning; none where it holds zeros, as no text does."""
+    head = first_bytes(path, _HEAD)
+    encoding = _encoding(head)
+    if b"\0" in head:
+        return encoding, []
+    return encoding, _ENDS.split(head.decode(encoding, "replace"))[:-1]
+
+
 def first_rows(path: Path) -> Iterator[tuple[str, str, list[list[str]]]]:
     """Yield encoding, separator and first rows of cells by each separator that makes rows of one length of a file.
 
     A line of names is among them, and at most `FIRST_ROWS` others. Nothing where the file holds zeros, as no text does.
     """
-    head = first_bytes(path, _HEAD)
-    if b"\0" in head:
-        return
-    encoding = encoding_of(head)
-    lines = [line for line in _ENDS.split(head.decode(encoding, "replace"))[:-1] if line.strip()][: FIRST_ROWS + 1]
+    encoding, lines = first_lines(path)
+    lines = [line for line in lines if line.strip()][: FIRST_ROWS + 1]
     for separator in ";\t|,":
         try:
             rows = list(csv.reader(lines, delimiter=separator))
@@ -71,7 +78,7 @@ def first_rows(path: Path) -> Iterator[tuple[str, str, list[list[str]]]]:
             yield encoding, separator, rows
 
 
-def encoding_of(head: bytes) -> str:
+def _encoding(head: bytes) -> str:
     """Return UTF-8 where the whole lines of a beginning are that, else Windows' Latin-1: units have degree signs."""
     try:
         head[: head.rfind(b"\n")].decode("utf-8")
@@ -88,6 +95,19 @@ def all_rows(raw: Path, encoding: str, separator: str) -> list[list[str]]:
             return list(csv.reader((line for line in stream if line.strip()), delimiter=separator))
     except csv.Error as error:
         raise InputError.at(raw, None, f"cannot be read as a table ({error}); expected cells of numbers") from None
+
+
+def rewrite_lines(raw: Path, target: Path, change: Callable[[Iterable[str]], Iterable[str]]) -> None:
+    """Write the lines of a text as they are after a ``change``, one by one: a long log is never held whole.
+
+    Raises `InputError` where the file cannot be read.
+    """
+    encoding, _ = first_lines(raw)
+    try:
+        with raw.open(encoding=encoding, errors="replace") as lines, target.open("w", encoding="utf-8") as written:
+            written.writelines(f"{line}\n" for line in change(line.rstrip("\n") for line in lines))
+    except OSError as error:
+        raise InputError.at(raw, None, f"cannot be read ({error}); expected lines of text") from None
 
 
 def holds_log(rows: Iterable[Sequence[Any]]) -> bool:
