@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from discsim.validation.importing.vectornav import BEGINS, sentence_cells
 
-__all__ = ["RecordLines", "labelled_cells", "names_of_list", "names_of_records", "stamped"]
+__all__ = ["RecordLines", "labelled_cells", "names_of_list", "names_of_records", "split_stamp", "stamped"]
 
 #: What serial monitors put before a line: "12:01:33.456 -> " (Arduino), "12:01:33.456 > " (PlatformIO), and a stamp in
 #: brackets, with or without the date (Tera Term).
@@ -61,6 +61,19 @@ def stamped(line: str) -> tuple[str, str, str] | None:
     if (logged := _ESP_IDF.match(line)) is not None:
         return _TIMES[1], logged[1], line[logged.end() :]
     return None
+
+
+def split_stamp(line: str) -> tuple[str, str]:
+    """Return what a serial monitor or ESP-IDF's log put before a line, as it stands there, and what follows.
+
+    Colours of a terminal are left out.
+
+    >>> split_stamp("12:01:33.456 -> 1,2"), split_stamp("1,2")
+    (('12:01:33.456 -> ', '1,2'), ('', '1,2'))
+    """
+    line = _COLOUR.sub("", line)
+    rest = line if (begun := stamped(line)) is None else begun[2]
+    return line[: len(line) - len(rest)], rest
 
 
 def labelled_cells(line: str) -> list[tuple[str, str]]:

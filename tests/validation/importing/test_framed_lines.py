@@ -66,6 +66,15 @@ def test_the_stamps_of_a_serial_monitor_stand_before_the_marks(tmp_path):
     assert_read(import_log(raw))
 
 
+def test_the_colours_of_a_terminal_about_a_line_take_nothing_away(tmp_path):
+    """ESP-IDF's log puts them before its stamp and behind the line: the rest of it was cut as many signs too early."""
+    raw = tmp_path / "esp.txt"
+    lines = [f"<{','.join(cells(k)[1:])}>" for k in range(LOG.t.size)]
+    stamps = [f"I ({1000 * t:.0f}) imu: " for t in LOG.t]
+    raw.write_text("".join(f"\x1b[0;32m{a}{b}\x1b[0m\n" for a, b in zip(stamps, lines, strict=True)))
+    assert_read(import_log(raw))
+
+
 def test_sensors_in_turn_behind_a_mark_are_records(tmp_path):
     """The attitude reference system for Razor boards prints counts as numbers with decimals."""
     raw = tmp_path / "razor.txt"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from discsim.errors import InputError
-from discsim.validation.importing.labelled import labelled_cells, stamped
+from discsim.validation.importing.labelled import labelled_cells, split_stamp
 from discsim.validation.importing.sniffing.other_forms.written import (
     FEWEST,
     FIRST_ROWS,
@@ -77,8 +77,8 @@ def _taken_off(line: str) -> tuple[_Frame, str] | None:
 
     VectorNav's sentences are read by their names, with their checksums.
     """
-    begun = stamped(line)
-    text = (line if begun is None else begun[2]).strip()
+    stamp, text = split_stamp(line)
+    text = text.strip()
     if text.startswith(BEGINS):
         return None
     inner = text.lstrip(_BEFORE)
@@ -98,7 +98,6 @@ def _taken_off(line: str) -> tuple[_Frame, str] | None:
     if not before and not name and (not behind or labelled_cells(middle)):
         return None
     frame = _Frame(before, name, "*" if behind.startswith("*") else behind)
-    stamp = "" if begun is None else line[: len(line) - len(begun[2])]
     return frame, f"{stamp}{middle[len(name) :]}"
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 
-from discsim.validation.importing.labelled import stamped
+from discsim.validation.importing.labelled import split_stamp
 from discsim.validation.importing.sniffing.names import sensor_of
 from discsim.validation.importing.sniffing.other_forms.written import (
     FIRST_ROWS,
@@ -43,10 +43,9 @@ def _headed(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
     """
     owner = ""
     for line in lines:
-        begun = stamped(line)
-        text = line if begun is None else begun[2]
+        stamp, text = split_stamp(line)
         if _AXIS.match(text):
-            yield owner, f"{line[: len(line) - len(text)]}{owner} {text.strip()}" if owner else line
+            yield owner, f"{stamp}{owner} {text.strip()}" if owner else line
             continue
         found = _HEAD.fullmatch(text.strip())
         owner = found[1] if found is not None and sensor_of(split_unit(found[1])[0]) is not None else ""
