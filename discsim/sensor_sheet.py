@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from numbers import Real
 from types import MappingProxyType
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from discsim.arrays import BoolArray, FloatArray, readonly
@@ -41,6 +42,11 @@ class SensorSheet:
             object.__setattr__(self, "position", _place(self.position))
         require_type(self.sigma, Mapping, "sigma", "a mapping from a field's name to its standard deviation")
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+
+    @property
+    def rate_uncertainty(self) -> float:
+        """What share of itself the rate is stated to be off by, one sigma; 0 where nothing is."""
+        return float(np.max(self.sigma.get("rate_hz", 0.0))) / self.rate_hz if self.rate_hz else 0.0
 
     def clipped(self, value: FloatArray) -> BoolArray:
         """Tell which of the sensor's readings, (n, k) or (n,), stand at a limit, stated or found in them."""

@@ -219,10 +219,9 @@ def _folded(recording: Recording, name: str) -> str:
 def _clocked(found: YawRate, recording: Recording) -> YawRate:
     """Return a rate that goes by the magnetometer's time with what its sampling rate is stated to be off by."""
     sheet = recording.sheets.get("magnetometer")
-    off = 0.0 if sheet is None else float(np.max(sheet.sigma.get("rate_hz", 0.0)))
-    if sheet is None or found.method not in BY_THE_CLOCK or not off > 0:
+    if sheet is None or found.method not in BY_THE_CLOCK or not sheet.rate_uncertainty > 0:
         return found
-    return replace(found, sd=np.hypot(found.sd, off / sheet.rate_hz * np.abs(found.rate)))
+    return replace(found, sd=np.hypot(found.sd, sheet.rate_uncertainty * np.abs(found.rate)))
 
 
 @one_thread

@@ -45,7 +45,7 @@ def sampling_notes(recording: Recording) -> list[str]:
     field = recording.sheets.get("magnetometer")
     if field is not None and "rate_hz" in field.sigma:
         notes.append(
-            f"the spacing of the rows is known to {100 * float(np.max(field.sigma['rate_hz'])) / field.rate_hz:.2g} % "
+            f"the spacing of the rows is known to {100 * field.rate_uncertainty:.2g} % "
             "only: rates from the field scale with it, and their standard deviations hold that; where it is known, "
             "write it into the import map as step_s, without step_sigma_s"
         )
@@ -189,4 +189,4 @@ def _spacing(recording: Recording, share: float) -> str:
 def _spacing_sigma(recording: Recording) -> float:
     """Return what share of itself the spacing of the rows is stated to be off by, one sigma; 0 where none is."""
     field = recording.sheets.get("magnetometer")
-    return 0.0 if field is None else float(np.max(field.sigma.get("rate_hz", 0.0))) / field.rate_hz
+    return 0.0 if field is None else field.rate_uncertainty

@@ -11,7 +11,6 @@ from discsim.disc import Aero, AeroTable, Disc, Release
 from discsim.environment import Environment
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording
-from discsim.sensor_sheet import SensorSheet
 from discsim.validation.checking.finding import Finding, Severity, doubts_of
 
 __all__ = ["FIELD", "statement_findings", "unlikely_flight"]
@@ -320,7 +319,7 @@ def _position(recording: Recording) -> Iterator[Finding]:
 
 def _row_spacing(recording: Recording) -> Iterator[Finding]:
     """Yield where rows have no times of their own, and what stands for them is a guess or told from readings."""
-    off = max((_rate_share(sheet) for sheet in recording.sheets.values()), default=0.0)
+    off = max((sheet.rate_uncertainty for sheet in recording.sheets.values()), default=0.0)
     if off > RATE:
         yield Finding(
             "sensors.row_spacing",
@@ -331,8 +330,3 @@ def _row_spacing(recording: Recording) -> Iterator[Finding]:
             "spin rates are off by as much, and lengths told from an acceleration by twice that; where the step is "
             "known, write step_s into the map of the import, without step_sigma_s",
         )
-
-
-def _rate_share(sheet: SensorSheet) -> float:
-    """Return what share of itself a sensor's rate is stated to be off by, one sigma."""
-    return float(np.max(sheet.sigma.get("rate_hz", 0.0))) / sheet.rate_hz if sheet.rate_hz else 0.0

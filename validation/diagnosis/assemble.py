@@ -21,7 +21,7 @@ from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
 from discsim.validation.diagnosis.design.next_recording import advise, confusions, in_words
-from discsim.validation.diagnosis.detectors.even_losses import lost_as_well, rather_lost
+from discsim.validation.diagnosis.detectors.even_losses import beside_losses, lost_as_well, rather_lost
 from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
@@ -84,7 +84,7 @@ def _named(
 ) -> NamedEffect:
     """Return an effect as the answer has it; ``less`` is the fit without it, ``choices`` what others choose for it."""
     final = found.final
-    errors = standard_errors(final)
+    errors = beside_losses(final.fit, final.hypothesis.candidates, standard_errors(final))
     values = {}
     width = {q.key: q.sigma for q in parameters_of(candidate)}
     for q, value, error in zip(final.fit.parameters, final.fit.at, errors, strict=True):

@@ -43,7 +43,7 @@ from discsim.validation.diagnosis.setup_effects import (
     without_faults,
 )
 from discsim.validation.diagnosis.stages import Prepared, Question, Tried
-from discsim.validation.diagnosis.unknown_law.find import FoundLaw, LawOfAll, find_law
+from discsim.validation.diagnosis.unknown_law.find import FoundLaw, LawOfAll, find_law, one_more_does_as_well
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit
@@ -173,7 +173,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     begun: Search | None = None
     if ready.rows is None and moves_out(followed):
         begun, law = _law_before_effects(problem, moving=True)
-        if law is not None:
+        if law is not None and not one_more_does_as_well(begun, law):
             return Tried(ready, None, begun, law)
     found = search(problem, begun=begun)
     if law_of_all.found is not None:
@@ -188,7 +188,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
 def _law_before_effects(problem: SearchProblem, *, moving: bool = False) -> tuple[Search, FoundLaw | None]:
     """Return where a search would begin, and the law found there without searching effects; None where none holds.
 
-    ``moving`` is whether something moves out in the bodies: no effect of the catalogue does.
+    ``moving`` is whether something moves out in the bodies: but for a drift no effect of the catalogue does.
     """
     begun = screened(problem)
     problem.progress("looking for a law", 4, 5)

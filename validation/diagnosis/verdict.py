@@ -9,6 +9,8 @@ import numpy as np
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.kind import BOARD
+from discsim.effects.sensors import ClockRate
+from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.answer.misstated import Misstated
 from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
@@ -24,8 +26,9 @@ from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Tried
 from discsim.validation.diagnosis.unknown_law.find import find_law, left_to_gain
 from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual
-from discsim.validation.identification.stated_parameters import STATED_NAMES
+from discsim.validation.identification.stated_parameters import ON_BOARD, STATED_NAMES
 
 __all__ = [
     "judged",
@@ -141,6 +144,8 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
     sd = standard_errors(found.final)
     result = {}
     for q, value, error in zip(fit.parameters, fit.at, sd, strict=True):
+        if q.group in CATALOGUE and CATALOGUE[q.group].type is ClockRate and any(q is p for p in found.own):
+            result.update(_rates(found.recordings[0], q, float(value), float(error)))
         if (
             q.key in fit.plant.own_keys
             or q.group in CATALOGUE
@@ -155,3 +160,15 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
             name = f"{name} ({','.join(str(i + 1) for i in sorted(q.recordings))})"
         result[name] = Recalibration(q.stated, sigma, float(value), float(error))
     return result
+
+
+def _rates(recording: Recording, clock: Parameter, ratio: float, error: float) -> dict[str, Recalibration]:
+    """Return the sampling rates of the sensors of a stated clock as a fit has it, at ``ratio`` +- ``error``."""
+    of, sheets = CATALOGUE[clock.group].acts_on, recording.sheets
+    rates = {
+        s: sheets[s].rate_hz for s in ON_BOARD if s in recording and of in (s, "clock") and sheets[s].rate_uncertainty
+    }
+    return {
+        f"{sensor}.rate_hz": Recalibration(rate, rate * clock.sigma, rate * ratio, rate * error)
+        for sensor, rate in rates.items()
+    }

@@ -10,13 +10,17 @@ from numpy.typing import ArrayLike
 from discsim.arrays import FloatArray
 from discsim.disc import Aero, Disc, aero_key
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import PositionOffset
+from discsim.effects.sensors import ClockRate, PositionOffset
 from discsim.recording import Recording
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import plant_of
 
-__all__ = ["STATED_NAMES", "exact_numbers", "stated_parameters"]
+__all__ = ["ON_BOARD", "STATED_NAMES", "exact_numbers", "stated_parameters"]
 
+#: sensors whose times are those of a logger's rows
+ON_BOARD = ("magnetometer", "accelerometer", "gyroscope")
+#: shares that rates are off by are one and the same where they differ by no more than rates of three digits are rounded
+_ROUNDED = 0.99
 _DISC = {"mass_kg": "mass", "diameter_m": "d", "Ixx_kg_m2": "Ixx", "Izz_kg_m2": "Izz"}
 _RIG = {"Izz_kg_m2": "Izz", "viscous_N_m_s": "viscous"}
 #: the name in a recording of each stated number of the hardware and the surroundings, by its place among parameters
@@ -105,11 +109,23 @@ def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
         for key, sigma in rig.sigma.items():
             if key in _RIG:
                 yield "rig", _RIG[key], float(getattr(rig, _RIG[key])), float(np.max(sigma))
+    yield from _clocks(recording)
     sheet = recording.sheets.get("accelerometer")
     if sheet is not None and "position_m" in sheet.sigma and sheet.position is not None:
         moved = catalogued(PositionOffset).id
         for axis, size in zip("xyz", _three(sheet.sigma["position_m"]), strict=True):
             yield moved, f"d{axis}_m", 0.0, float(size)
+
+
+def _clocks(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
+    """Yield the clocks of sensors on board whose sampling rate comes with a sigma: one of all where rows are alike."""
+    off = {sensor: sheet.rate_uncertainty for sensor in ON_BOARD if (sheet := recording.sheets.get(sensor)) is not None}
+    most = max(off.values(), default=0.0)
+    alike = all(share > _ROUNDED * most for share in off.values())
+    for sensor, share in {"clock": most}.items() if alike else off.items():
+        row = catalogued(ClockRate, sensor)
+        if recording.plant in row.plants:
+            yield row.id, "ratio", row.baseline.ratio, share
 
 
 def _three(sigma: ArrayLike) -> FloatArray:

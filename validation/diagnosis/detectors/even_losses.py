@@ -17,19 +17,21 @@ from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.validation.diagnosis.detectors.dropped_samples import price_of_places
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.own_sizes import own_sizes
-from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.prediction import shown
 from discsim.validation.identification.readings import Readings, group_of
 from discsim.validation.identification.sensor_model import delay
 
-__all__ = ["lost_as_well", "rather_lost"]
+__all__ = ["beside_losses", "lost_as_well", "rather_lost"]
 
 #: variance of what is anywhere within one sample, as of a reading that is rounded to it
 _SAWTOOTH = 1.0 / 12.0
 #: a clock that is slower than by this share is none: data sheets of inertial sensors state their output rate within 1 %
 #: (BMI160, MPU-9250), and loggers that lose some per cent of the samples are common
 _OUT_OF_TOLERANCE = 0.01
+#: twice the logarithm of odds that are positive evidence (R. Kass and A. Raftery, Bayes factors, J. Am. Stat. Assoc.
+#: 90, 1995, p. 777): what is named must be likelier, and the other is listed beside it
+_POSITIVE = 2.0
 
 
 def lost_as_well(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, float | None] | None:
@@ -42,10 +44,9 @@ def lost_as_well(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, floa
     lossy = next((one for one in CATALOGUE.values() if one.type is DroppedSamples and one.acts_on == row.acts_on), None)
     if row.type is not ClockRate or lossy is None or fit.plant.name in lossy.unseen_on:
         return None
-    places = [k for k, q in enumerate(fit.parameters) if (q.group, q.recordings) == (row.id, candidate.recordings)]
-    if not places:
+    place = _place_of(fit, candidate)
+    if place is None:
         return None  # of a clock that is no part of the fit nothing is known
-    (place,) = places
     share = 1.0 - float(fit.at[place])
     acting = [i for i in range(len(fit.trajectories)) if candidate.recordings is None or i in candidate.recordings]
     read = [(i, one) for i in acting for one in fit.trajectories[i].readings if one.sensor == row.acts_on]
@@ -79,9 +80,47 @@ def rather_lost(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, float
     and the same in all. Losses come at random, and each recording has had its own.
     """
     lost = lost_as_well(fit, candidate) if candidate.recordings is None else None
-    if lost is None or (lost[1] <= _OUT_OF_TOLERANCE and own_sizes(fit, candidate).chance > SELECTION.unlike):
+    if lost is None or (lost[1] <= _OUT_OF_TOLERANCE and _evidence_of_walk(fit, candidate, lost[2]) < _POSITIVE):
         return None
     return lost
+
+
+def beside_losses(fit: Fit, candidates: Sequence[CandidateEffect], errors: FloatArray) -> FloatArray:
+    """Return the errors (p,) of a fit's numbers, wider by what the walk of lost samples does to each.
+
+    ``candidates`` are the effects of the fit. Each number goes with a clock that stands for losses as their covariance
+    says, and the walk takes that clock elsewhere than the motion would.
+    """
+    for candidate in candidates:
+        lost = rather_lost(fit, candidate)
+        if lost is not None and lost[2] is not None:
+            place = _place_of(fit, candidate)
+            assert place is not None
+            with_clock = fit.covariance[:, place] / fit.covariance[place, place]
+            walk = max(lost[2] ** 2 - float(fit.covariance[place, place]), 0.0)
+            errors = np.hypot(errors, np.abs(with_clock) * np.sqrt(walk))
+    return errors
+
+
+def _place_of(fit: Fit, clock: CandidateEffect) -> int | None:
+    """Return the place of a clock's ratio among a fit's parameters; None where it is no part of the fit."""
+    keys = [(q.group, q.recordings) for q in fit.parameters]
+    wanted = (clock.id, clock.recordings)
+    return keys.index(wanted) if wanted in keys else None
+
+
+def _evidence_of_walk(fit: Fit, candidate: CandidateEffect, sd: float | None) -> float:
+    """Return twice the logarithm by which a clock's sizes in each recording are likelier of random losses than of one.
+
+    ``sd`` is the error of the share that was lost. One clock makes sizes as unlike as their errors, of a variance v;
+    losses add the variance r v of their walk. Sizes that gain G by k freed numbers then have the likelihood of
+    ``G r/(1 + r) - k log(1 + r)`` beside those of one clock. Nothing speaks for losses where no error is known.
+    """
+    sizes, place = own_sizes(fit, candidate), _place_of(fit, candidate)
+    if sd is None or place is None or not sizes.freed:
+        return -np.inf
+    ratio = sd**2 / float(fit.covariance[place, place]) - 1.0
+    return float(sizes.gain * ratio / (1.0 + ratio) - sizes.freed * np.log1p(ratio))
 
 
 def _of_one_sample(fit: Fit, recording: int, readings: Readings) -> FloatArray:

@@ -25,13 +25,14 @@ from discsim.validation.diagnosis.relaxed_fit.clocks import (
     with_clock_of_gyroscope,
     with_free_clocks,
 )
+from discsim.validation.diagnosis.relaxed_fit.coarse_steps import as_far_as_steps_tell
 from discsim.validation.diagnosis.relaxed_fit.further_steps import STEPS, TOLERANCE, fitted_further
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import followed_out_of_balance
 from discsim.validation.diagnosis.relaxed_fit.parameters import relaxed_parameters, supposed_parameters
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
-from discsim.validation.identification.noise import robust_noise, stated_noise
+from discsim.validation.identification.noise import estimate_noise, robust_noise, stated_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import plant_of
 
@@ -59,7 +60,8 @@ def relaxed(
     ratio = _wrong_time(recordings, agreeing)
     trajectories = tuple(trajectory_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in trajectories for readings in one.readings}
-    clock = () if ratio == 1.0 else (Parameter(*CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
+    right = ratio == 1.0 or any(q.key == CLOCK for q in known)
+    clock = () if right else (Parameter(*CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
     loose = relaxed_parameters(recordings, sensors, free_running=bool(supposed))
     if any(q.group in _OFFSETS for q in known):
         # only differences between the times of sensors show, and the setup has found which one is off
@@ -79,8 +81,10 @@ def relaxed(
         fit = with_clock_of_gyroscope(fit)
     if ratio == 1.0:
         fit = with_free_clocks(led_by_other_sensors(fit))
+    left = estimate_noise(fit.linears, [linear.residual for linear in fit.linears], coloured=False)
     trajectories = tuple(
-        within_range(trajectory, linear) for trajectory, linear in zip(fit.trajectories, fit.linears, strict=True)
+        as_far_as_steps_tell(within_range(trajectory, linear), linear, left)
+        for trajectory, linear in zip(fit.trajectories, fit.linears, strict=True)
     )
     fit = replace(fit, trajectories=trajectories)
     linears = linearised(fit)

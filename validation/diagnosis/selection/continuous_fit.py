@@ -257,7 +257,26 @@ def _of_starts(fit: Fit) -> float:
 
 def standard_errors(fitted: ContinuousFit) -> FloatArray:
     """Return the standard errors (p,) of a fit's parameters, NaN where it has no covariance."""
-    covariance = fitted.fit.covariance
-    if covariance.shape[0] != len(fitted.fit.parameters):
-        return np.full(len(fitted.fit.parameters), np.nan)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    fit, covariance = fitted.fit, fitted.fit.covariance
+    if covariance.shape[0] != len(fit.parameters):
+        return np.full(len(fit.parameters), np.nan)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    for place in _untold_clocks(fit):
+        # it may be anywhere that is stated, and every other number goes with it
+        variance = float(covariance[place, place])
+        beyond = max(fit.parameters[place].sigma ** 2 - variance, 0.0)
+        errors = np.hypot(errors, np.abs(covariance[:, place]) / variance * np.sqrt(beyond))
+    return errors
+
+
+def _untold_clocks(fit: Fit) -> list[int]:
+    """Return the places of clocks that stand for rates of rows which nobody knows, where no sensor tells the time.
+
+    A free spin without a gyroscope is the same in slow motion: lengths and the air's moments go with its time. Nobody
+    knows those moments, and that a fit finds them of an ordinary size at one time rather than another tells nothing.
+    """
+    if not fit.plant.weakly_identified or any("gyroscope" in one.recording for one in fit.trajectories):
+        return []
+    stated = any(sheet.rate_uncertainty for sheet in fit.trajectories[0].recording.sheets.values())
+    clocks = [k for k, q in enumerate(fit.parameters) if q.group in CLOCKS and q.name == "ratio" and stated]
+    return [k for k in clocks if fit.covariance[k, k] > 0.0]

@@ -40,7 +40,7 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import Plant
 from discsim.validation.identification.plants.law_terms import Term
 
-__all__ = ["FoundLaw", "LawOfAll", "find_law", "left_to_gain"]
+__all__ = ["FoundLaw", "LawOfAll", "find_law", "left_to_gain", "one_more_does_as_well"]
 
 
 @dataclass(frozen=True)
@@ -225,12 +225,18 @@ class LawOfAll:
         A scale of a sensor and a drift are two effects of the catalogue, and a law of two terms says the same.
         """
         law = find_law(search.at_base(), instead=False)
-        if law is None or not law.explains_all:
-            return False
-        _, with_one_more = next_effect(search, search.final, len(search.final.hypothesis.candidates))
-        if with_one_more is None or _does_better(law, with_one_more):
+        if law is not None and law.explains_all and not one_more_does_as_well(search, law):
             self.found = law
         return self.found is not None
+
+
+def one_more_does_as_well(search: Search, law: FoundLaw) -> bool:
+    """Tell whether one further effect, beside those that a search has come to, explains as much as a law.
+
+    A drift in proportion to time is an effect of the catalogue, and a law of time to the power 1 says the same.
+    """
+    _, with_one_more = next_effect(search, search.final, len(search.final.hypothesis.candidates))
+    return with_one_more is not None and not _does_better(law, with_one_more)
 
 
 def left_to_gain(fit: Fit, about: Collection[str]) -> float:

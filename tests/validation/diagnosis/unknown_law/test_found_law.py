@@ -421,6 +421,15 @@ def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_
 
 
 @pytest.mark.slow
+def test_a_drift_of_a_body_out_of_balance_is_no_law_of_time():
+    """A blind case: beside a motion that moments fixed in the body turn, time to the power 1.003 was told as a law."""
+    found = diagnose([recordings(Request(681036).draw())[:3]], ["throws"]).diagnosis
+    assert found.law is None
+    assert found.verdict == "explained"
+    assert {effect.id for effect in found.effects} == {"accel.bias_drift"}
+
+
+@pytest.mark.slow
 def test_a_disc_that_dries_is_not_explained_by_thin_air():
     """One effect on the motion leaves no more than noise, and a law gains 170 more."""
     found = diagnose([recordings(Request(636024).draw())], ["throws"]).diagnosis
