@@ -108,9 +108,20 @@ def _of_an_interrupt(error: BaseException | None) -> bool:
     return error is not None
 
 
+def _usage(error: typer.TyperException) -> str:
+    """Return how the command of an error is called: of an option's value with a space the shell makes two words."""
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return "no further word"
+    pieces = [piece.strip("{}").upper() for piece in context.command.collect_usage_pieces(context)]
+    words = " ".join([context.command_path, *pieces])
+    return f"`{words}`, and quotes about a value with a space in it"
+
+
 def _in_one_line(error: BaseException) -> str:
     if isinstance(error, typer.TyperException):
-        return str(error.format_message())
+        said = str(error.format_message())
+        return f"{said}; expected {_usage(error)}" if said.startswith("Got unexpected extra argument") else said
     if isinstance(error, OSError):
         what = error.strerror or str(error) or type(error).__name__
         where = f"{os.fsdecode(error.filename)}: " if isinstance(error.filename, str | bytes) else ""

@@ -193,6 +193,10 @@ DATAFLASH = {
 }  # fmt: skip
 
 
+#: what a count is worth of the formats that are scaled: hundredths, and degrees of a place
+_SCALED = {"c": 0.01, "L": 1e-7}
+
+
 def dataflash(rows: list[tuple[float, str, tuple[float, ...]]]) -> bytes:
     """Return a DataFlash log: descriptions of the messages (FMT, one of itself first), then time, name and values."""
     described = [(0x80, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")]
@@ -203,6 +207,17 @@ def dataflash(rows: list[tuple[float, str, tuple[float, ...]]]) -> bytes:
         kind, _, packed, _ = DATAFLASH[name]
         whole += b"\xa3\x95" + bytes([kind]) + struct.pack(packed, 3_000_000 + round(1e6 * t), *values)
     return whole
+
+
+def dataflash_text(rows: list[tuple[float, str, tuple[float, ...]]]) -> bytes:
+    """Return the same as the text that ArduPilot's tools make of it: scaled numbers between commas and spaces."""
+    lines = ["FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns"]
+    for name, (kind, form, packed, columns) in DATAFLASH.items():
+        lines.append(f"FMT, {kind}, {3 + struct.calcsize(packed)}, {name}, {form}, {columns}")
+    for t, name, values in sorted(rows, key=lambda row: row[0]):
+        scaled = [_SCALED.get(letter, 1.0) * v for letter, v in zip(DATAFLASH[name][1][1:], values, strict=True)]
+        lines.append(f"{name}, {3_000_000 + round(1e6 * t)}, " + ", ".join(f"{value:.9g}" for value in scaled))
+    return ("\n".join(lines) + "\n").encode()
 
 
 def ardupilot(log: Log, fixes: Path) -> list[tuple[float, str, tuple[float, ...]]]:

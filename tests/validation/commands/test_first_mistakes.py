@@ -105,3 +105,14 @@ def test_a_place_without_a_date_is_refused_before_the_log_is_read(monkeypatch, t
     assert stop.value.code == 2
     assert "--place LAT,LON and --date YYYY-MM-DD belong together" in capsys.readouterr().err
     assert not Path("throw").exists()
+
+
+@pytest.mark.parametrize("words", [["a.csv", "b.csv"], ["a.csv", "--place", "47.4", "8.5"]])
+def test_a_word_too_many_is_told_with_how_the_command_is_called(words, monkeypatch, capsys):
+    """Two files of a log, and a place with a space in it."""
+    monkeypatch.setattr(sys, "argv", ["discsim", "import", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    said = capsys.readouterr().err
+    assert f"extra argument(s) ({words[-1]}); expected `discsim import [OPTIONS] RAW`, and quotes" in said

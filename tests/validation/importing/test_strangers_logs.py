@@ -337,7 +337,6 @@ REFUSED = {
     ),
     "list.json": ('[{"sensor":"Gyroscope","x":"0.1"}]', "is JSON; write it as CSV"),
     "track.kml": ('<?xml version="1.0"?>\n<kml></kml>\n', "is XML"),
-    "00000012.log": ("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n" * 9, "is an ArduPilot text log"),
     "serial.txt": ("0 ms aX = 0.1 | aY = 0.2\n" * 9, "it begins '0 ms aX = 0.1 | aY = 0.2'"),
 }
 

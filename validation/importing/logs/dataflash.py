@@ -1,7 +1,8 @@
-"""An ArduPilot DataFlash log (.bin) as tables.
+"""An ArduPilot DataFlash log, packed (.bin) or as text (.log), as tables.
 
-Units are those of ArduPilot's "Onboard Message Log Messages": time in us since boot; IMU (and GYR, ACC, the fast ones)
-rad/s and m/s^2; MAG milligauss, offsets applied; GPS degrees, m above the sea, m/s, degrees of course, and VZ m/s down.
+Units are those of ArduPilot's "Onboard Message Log Messages": time in us since boot (ms in old ones); IMU (and GYR,
+ACC, the fast ones) rad/s and m/s^2; MAG milligauss, offsets applied; GPS degrees, m above the sea, m/s, degrees of
+course, and VZ m/s down.
 Messages have no checksum: bytes that are none are seen, a number that was damaged is not.
 """
 
@@ -33,6 +34,9 @@ FIELDS = {
     "MAG": (("magnetometer", "Mag", 0.1, "Health"),),
 }
 FAST = "GYR and ACC"
+#: The description of a message in a log as text, and how far from its beginning the first of them is looked for.
+_DESCRIBED = re.compile(rb"(?:^|\n)FMT, ?\d+, ?\d+, ?\w+, ?\w+, ?\w+,")
+_HEAD = 1 << 12
 #: Status of GPS from which on there is a height: 3 is a fix in three dimensions.
 FIX_3D = 3
 #: Bytes at most that pad a page of a log of blocks: 256, less a header of 6 and one byte (pymavlink's DFReader).
@@ -43,28 +47,41 @@ _ONE_BLOCK = threading.Lock()
 
 def begins(head: bytes) -> bool:
     """Tell a DataFlash log: it begins with a message, and the description of one (FMT) is near its beginning."""
-    return head.startswith(MAGIC) and MAGIC + b"\x80" in head
+    return (head.startswith(MAGIC) and MAGIC + b"\x80" in head) or _is_text(head)
+
+
+def _is_text(head: bytes) -> bool:
+    """Tell a log as text by its beginning, a description of a message; notes of a ground station may stand before."""
+    return b"\0" not in head and _DESCRIBED.search(head) is not None
 
 
 def read(raw: Path) -> Log:
     """Return the tables of a log; bytes that are no message are stepped over and counted."""
-    from pymavlink.DFReader import DFReader_binary
+    from pymavlink.DFReader import DFReader_binary, DFReader_text
 
+    with raw.open("rb") as stream:
+        text = _is_text(stream.read(_HEAD))
     said = io.StringIO()  # it prints what it finds damaged, and its part in C a line for each such byte
-    rows = Rows()
+    rows, got = Rows(), 0
     with (
         contextlib.redirect_stdout(said),
         contextlib.redirect_stderr(said),
         _unheard(),
-        DFReader_binary(str(raw)) as log,
+        (DFReader_text if text else DFReader_binary)(str(raw)) as log,
     ):
         wanted = list(MESSAGES)
         while (message := log.recv_match(type=wanted)) is not None:
+            got += message.get_type() in wanted
             _add(message, rows)
-        lost = log.data_len - sum(log.counts[kind] * form.len for kind, form in log.formats.items())
-        total = log.data_len
+        if text:
+            lost, total = sum(log.counts.get(kind, 0) for kind in wanted) - got, 0
+        else:
+            lost = log.data_len - sum(log.counts[kind] * form.len for kind, form in log.formats.items())
+            total = log.data_len
     notes = []
-    if lost > PADDING:
+    if text and lost > 0:
+        notes.append(f"lines that break off or are damaged: {lost}; left out")
+    elif lost > PADDING:
         notes.append(f"{lost} of {total} bytes are no message and are left out")
     elif lost < 0:
         notes.append("it breaks off within a message; read up to there")
@@ -100,10 +117,15 @@ def _add(message: Any, rows: Rows) -> None:
         return
     source = f"{FAST if name in ('GYR', 'ACC') else name} {unit}"
     # the fast ones carry the time of the reading apart from that of writing
-    time = getattr(message, "SampleUS", 0) or message.TimeUS
+    time = getattr(message, "SampleUS", 0) or _time(message)
     for sensor, field, worth, sound in FIELDS[name]:
         if not sound or getattr(message, sound, True):
             rows.add(source, sensor, time, [worth * getattr(message, f"{field}{axis}") for axis in "XYZ"])
+
+
+def _time(message: Any) -> float:
+    """Return when a message was written, us since boot."""
+    return float(message.TimeUS if hasattr(message, "TimeUS") else 1000 * message.TimeMS)
 
 
 def _add_fix(message: Any, rows: Rows, source: str) -> None:
@@ -111,4 +133,4 @@ def _add_fix(message: Any, rows: Rows, source: str) -> None:
         return
     north, east = course_velocity(message.Spd, message.GCrs)
     down = getattr(message, "VZ", np.nan)
-    rows.add(source, "gps", message.TimeUS, (message.Lat, message.Lng, message.Alt, north, east, down))
+    rows.add(source, "gps", _time(message), (message.Lat, message.Lng, message.Alt, north, east, down))

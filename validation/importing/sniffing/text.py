@@ -32,10 +32,6 @@ SIGNATURES = (
     (b"\x80\x05\x95", "a pickle of Python's, which may run anything once it is opened; write its table as CSV"),
     (b"TDSm", "a TDMS file of LabVIEW; write its channels as CSV (in Python: nptdms.TdmsFile(FILE).as_dataframe())"),
     (b"#ROSBAG V2", "a bag of ROS 1; make it an MCAP (`mcap convert FILE OTHER.mcap`)"),
-    (
-        b"FMT,",
-        "an ArduPilot text log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
-    ),
     (b'[{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE).to_csv(OTHER))"),
     (b'{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE, lines=True).to_csv(OTHER))"),
     (b"<?xml", "XML; write its readings as CSV"),
