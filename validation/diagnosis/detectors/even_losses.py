@@ -77,12 +77,14 @@ def rather_lost(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, float
     """Return lost samples as `lost_as_well` does where they are likelier than a clock of a fit, else None.
 
     Where no reading tells the two apart, what a part may be tells: a clock of all recordings is within its tolerance,
-    and the same in all. Losses come at random, and each recording has had its own.
+    and the same in all. Losses come at random, and each recording has had its own. Where a fit holds their walk about
+    the clock, it has gained more than it costs.
     """
     lost = lost_as_well(fit, candidate) if candidate.recordings is None else None
-    if lost is None or (lost[1] <= _OUT_OF_TOLERANCE and _evidence_of_walk(fit, candidate, lost[2]) < _POSITIVE):
-        return None
-    return lost
+    if lost is None or lost[1] > _OUT_OF_TOLERANCE:
+        return lost
+    walks = any(candidate.row.acts_on in one.lost for one in fit.trajectories)
+    return lost if walks or _evidence_of_walk(fit, candidate, lost[2]) > _POSITIVE else None
 
 
 def beside_losses(fit: Fit, candidates: Sequence[CandidateEffect], errors: FloatArray) -> FloatArray:

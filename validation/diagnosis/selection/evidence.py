@@ -17,7 +17,7 @@ from discsim.effects.setup import TimeOffset
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.settings import SELECTION
 
-__all__ = ["charge", "lead", "price"]
+__all__ = ["charge", "lead", "price", "price_of_oddity"]
 
 #: within which parameters make sense, the effects' and a rig's own
 BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
@@ -79,5 +79,13 @@ def price(candidate: CandidateEffect) -> float:
     row = candidate.row
     if row.event:
         return (SELECTION.event_entry if row.brief else SELECTION.gust_entry) + SELECTION.per_parameter * count
-    odd = candidate.recordings is not None and row.in_all
-    return SELECTION.entry + SELECTION.per_parameter * count + (SELECTION.other_disc if odd else 0.0)
+    return SELECTION.entry + SELECTION.per_parameter * count + price_of_oddity(candidate)
+
+
+def price_of_oddity(candidate: CandidateEffect) -> float:
+    """Return what a candidate costs beside that, as what all recordings of a disc or a sensor have, and some have not.
+
+    It is zero of all that may come and go.
+    """
+    odd = candidate.recordings is not None and candidate.row.in_all and not candidate.row.event
+    return SELECTION.other_disc if odd else 0.0

@@ -11,11 +11,14 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.effects.setup import TimeOffset
 from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, begun_later, recounted, uncounted
+from discsim.validation.diagnosis.detectors.even_losses import rather_lost
+from discsim.validation.diagnosis.detectors.walk_of_losses import price_of_walk, walked, without_walk
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import in_reach
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
+from discsim.validation.identification.gauss_newton import Fit
 
 __all__ = ["with_losses_recounted"]
 
@@ -23,6 +26,8 @@ __all__ = ["with_losses_recounted"]
 _LOST = {sensor: catalogued(DroppedSamples, sensor).id for sensor in ("magnetometer", "accelerometer")}
 #: most rounds in which counts of lost samples and the motion better one another
 _RECOUNTS = 6
+#: by how much a score must fall for another round: less is where fits stop
+_SETTLED = 0.1
 #: fewest losses for which a slow clock may stand
 _FEWEST = 4
 
@@ -30,11 +35,52 @@ _FEWEST = 4
 def with_losses_recounted(found: Search, current: ContinuousFit) -> tuple[Search, ContinuousFit]:
     """Return a search and its fit with the losses of its sensors counted anew by the motion that it tells."""
     for sensor, id in _LOST.items():
+        found, current = _walked(found, current, sensor)
         if any(candidate.id == id for candidate in current.hypothesis.candidates):
             found, current = _recounted(found, current, sensor)
             found, current = _begun_later(found, current, sensor)
             found, current = _by_a_slow_clock(found, current, sensor)
     return found, current
+
+
+def _walked(found: Search, current: ContinuousFit, sensor: str) -> tuple[Search, ContinuousFit]:
+    """Return a search and its fit with the walk of losses for which a slow clock of a sensor stands, while it gains.
+
+    What a clock leaves of them would pass for a drift, a shift of a run's times, a place. A walk that gains no longer
+    what it costs, beside what was found since, is none.
+    """
+    clock = next((c for c in current.hypothesis.candidates if (c.row.type, c.row.acts_on) == (ClockRate, sensor)), None)
+    if clock is None or rather_lost(current.fit, clock) is None:
+        return found, current
+    has = price_of_walk(current.fit, clock, found.relaxed_noise)
+    for _ in range(_RECOUNTS):
+        again, cost = walked(current.fit, clock, found.relaxed_noise)
+        fitted = _with_times_of(found, current, again, cost - has)
+        if not fitted.score < current.score - _SETTLED:
+            break
+        found, current, has = _holding(found, again, sensor, cost - has), fitted, cost
+    if has:
+        bare = without_walk(current.fit, sensor)
+        fitted = _with_times_of(found, current, bare, -has)
+        if fitted.score < current.score:
+            return _holding(found, bare, sensor, -has), fitted
+    return found, current
+
+
+def _with_times_of(found: Search, current: ContinuousFit, again: Fit, dearer: float) -> ContinuousFit:
+    """Return the fit of the same effects with the losses of the trajectories of another, which cost so much more."""
+    fitted = continuous_fit(again, current.hypothesis, found.own, current.fit.noise, values_of_fit(current))
+    return found.with_cost(fitted, dearer)
+
+
+def _holding(found: Search, fit: Fit, sensor: str, dearer: float) -> Search:
+    """Return a search whose relaxed fit holds the losses of a sensor as a fit has them, none where that has none."""
+    trajectories = without_walk(found.relaxed_fit, sensor).trajectories
+    trajectories = tuple(
+        replace(one, lost={**one.lost, sensor: other.lost[sensor]}) if sensor in other.lost else one
+        for one, other in zip(trajectories, fit.trajectories, strict=True)
+    )
+    return replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=trajectories), cost=found.cost + dearer)
 
 
 def _recounted(found: Search, current: ContinuousFit, sensor: str) -> tuple[Search, ContinuousFit]:

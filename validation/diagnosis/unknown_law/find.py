@@ -18,6 +18,7 @@ from discsim.effects.kind import BOARD
 from discsim.validation.diagnosis.result import Law
 from discsim.validation.diagnosis.selection.candidates import parameters_of, stand_ins
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.evidence import price_of_oddity
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.next_effect import next_effect
 from discsim.validation.diagnosis.selection.search_state import Search
@@ -205,8 +206,9 @@ def _on_motion(plant: Plant) -> tuple[Term, ...]:
 
 
 def _does_better(law: FoundLaw, fitted: ContinuousFit) -> bool:
-    """Tell whether a law is worth its price over a fit with effects."""
-    return _priced(law.fitted) + SELECTION.entry <= fitted.score
+    """Tell whether a law is worth its price over a fit with effects; one that some recordings alone have is dear."""
+    odd = sum(price_of_oddity(candidate) for candidate in fitted.hypothesis.candidates)
+    return _priced(law.fitted) + SELECTION.entry <= fitted.score + odd
 
 
 #: kinds of a sensor's terms that no effect passes for: what turns or swings, and a play, leave what is seen as such
