@@ -421,6 +421,17 @@ def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_
 
 
 @pytest.mark.slow
+def test_a_torque_of_a_power_is_no_quadratic_decay_and_another_coefficient_in_one_throw():
+    """A blind case: both effects leave noise alone, but a disc has its coefficients in all throws."""
+    found = diagnose([recordings(Request(682038).draw())], ["throws"]).diagnosis
+    assert found.verdict == "unexplained"
+    assert found.law is not None
+    assert (found.law.text, found.law.target) == ("c * |r|^n * sign(r)", "moment_z_N_m")
+    exponent = found.law.coefficients["n"]
+    assert exponent.value == pytest.approx(2.727, abs=3.0 * exponent.sd)
+
+
+@pytest.mark.slow
 def test_a_drift_of_a_body_out_of_balance_is_no_law_of_time():
     """A blind case: beside a motion that moments fixed in the body turn, time to the power 1.003 was told as a law."""
     found = diagnose([recordings(Request(681036).draw())[:3]], ["throws"]).diagnosis
