@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
-from scipy.signal import lfilter
 from scipy.special import expit, logit
 
 from discsim.arrays import FloatArray, IntArray, sd_by_median
+from discsim.compiled import compiled_nogil
 from discsim.validation.identification.linear import Channel, Linear
 
 __all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likeliest_noise", "log_likelihood", "whitened"]
@@ -46,17 +46,6 @@ class GroupNoise(NamedTuple):
     def memory(self, interval: float) -> float:
         """Return the time constant of the correlated part, s, of samples that lie ``interval`` s apart."""
         return -interval / float(np.log(self.correlation)) if self.correlation > 0.0 else 0.0
-
-    @property
-    def innovation(self) -> tuple[float, float]:
-        """Return the moving-average coefficient of the noise as ARMA(1, 1), and its innovation over the level."""
-        phi, white = self.correlation, 1.0 - self.share
-        if phi == 0.0:
-            return 0.0, 1.0
-        total = white * (1.0 + phi**2) + self.share * (1.0 - phi**2)
-        q = phi * white / total
-        theta = (1.0 - float(np.sqrt(max(1.0 - 4.0 * q * q, 0.0)))) / (2.0 * q) if q > 1e-9 else 0.0
-        return theta, float(np.sqrt(total / (1.0 + theta**2)))
 
 
 NoiseModel = Mapping[str, GroupNoise]
@@ -104,10 +93,36 @@ def _freed(x: FloatArray, noise: GroupNoise, index: IntArray) -> FloatArray:
         gap = phi ** np.diff(index)[:, None].astype(float)
         x[1:] = (x[1:] - gap * x[:-1]) / np.sqrt(1.0 - gap**2)
         return x
-    theta, innovation = noise.innovation
-    # the first reading has the level of all, not that of an innovation
-    state = x[:1] * (innovation - 1.0)
-    return np.asarray(lfilter([1.0, -phi], [1.0, -theta], x, axis=0, zi=state)[0] / innovation)
+    freed = np.array(x, dtype=float)
+    _innovations(freed, index, phi, noise.share)
+    return freed
+
+
+@compiled_nogil
+def _innovations(x: FloatArray, index: IntArray, phi: float, share: float) -> float:
+    """Put into rows (n, c) of unit level what each adds to those before it, in its spread; return log determinant.
+
+    By a Kalman filter of a wander of variance ``share`` with the correlation ``phi`` under white noise (A. Harvey,
+    Forecasting, Structural Time Series Models and the Kalman Filter, 1989, 3.4). Where samples are missing, which
+    ``index`` tells, the wander goes on and is known the less: what it does meanwhile would be taken for something new,
+    reading after reading.
+    """
+    known = np.zeros(x.shape[1])
+    variance, total = share, 0.0
+    for n in range(x.shape[0]):
+        if n > 0:
+            kept = phi ** (index[n] - index[n - 1])
+            known *= kept
+            variance = kept * kept * variance + share * (1.0 - kept * kept)
+        spread = variance + 1.0 - share
+        gain = variance / spread
+        for k in range(x.shape[1]):
+            new = x[n, k] - known[k]
+            known[k] += gain * new
+            x[n, k] = new / np.sqrt(spread)
+        variance *= 1.0 - gain
+        total += np.log(spread)
+    return float(total)
 
 
 def chi_squared(linear: Linear, noise: NoiseModel, residual: FloatArray) -> float:
@@ -315,7 +330,7 @@ def _log_determinant(noise: GroupNoise, index: IntArray) -> float:
     """Return twice the log determinant of the whitening of one channel of unit level, less its sign."""
     if noise.share >= 1.0:
         return float(np.sum(np.log1p(-(noise.correlation ** (2.0 * np.diff(index))))))
-    return 2.0 * (index.size - 1) * float(np.log(noise.innovation[1]))
+    return float(_innovations(np.zeros((index.size, 0)), index, noise.correlation, noise.share))
 
 
 def robust_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray]) -> dict[str, GroupNoise]:

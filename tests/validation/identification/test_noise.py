@@ -76,6 +76,22 @@ def test_whitening_reaches_over_missing_samples():
     assert pytest.approx(np.eye(4), abs=1e-12) == W @ covariance @ W.T
 
 
+@pytest.mark.parametrize("missing", [(), (2, 3), tuple(range(2, 60))])
+def test_a_wander_under_white_noise_goes_on_where_samples_are_missing(missing):
+    """A blind case without anything in it had an alarm: beyond a clipped stretch the wander passed for news."""
+    linear = rows(("gyroscope", 70), missing=missing)
+    own = GroupNoise(0.5, 0.95, 0.6)
+    index = linear.channels[0].index
+    covariance = 0.25 * (0.6 * 0.95 ** np.abs(index[:, None] - index[None, :]) + 0.4 * np.eye(index.size))
+    W = whitened(linear, {"gyroscope": own}, np.eye(index.size))
+    assert pytest.approx(np.eye(index.size), abs=1e-12) == W @ covariance @ W.T
+    residual = np.random.default_rng(7).standard_normal(index.size)
+    told = log_likelihood(linear, {"gyroscope": own}, residual)
+    dense = -2.0 * multivariate_normal(cov=covariance).logpdf(residual)
+    # less what readings that fit in the noise of the sheet have, 1 here
+    assert told == pytest.approx(dense - index.size * (np.log(2.0 * np.pi) + 1.0), abs=1e-9)
+
+
 def test_channels_do_not_leak_into_one_another():
     linear = rows(("gyroscope", 5), ("gyroscope", 5))
     W = whitened(linear, {"gyroscope": GroupNoise(1.0, 0.7)}, np.eye(10))
