@@ -80,7 +80,7 @@ def diagnose(
             supposed = suppose(tried, question)
             if supposed is not None:
                 again = tried_under(supposed, question)
-                tried = again if stands(again) else tried
+                tried = again if stands(again, tried) else tried
         tried = _with_numbers(_with_law_of_one(tried, question), question)
         if tried.found is not None and tried.law is None:
             tried = replace(tried, found=with_instants_weighed(without_refuted(tried.found)))
@@ -239,14 +239,30 @@ def prepared_under(setup: SetupFindings, question: Question) -> Prepared:
     return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), agreeing, agreement, rows)
 
 
-def _follows(tried: Tried) -> bool:
-    """Tell whether sensors do not contradict one another under a supposition."""
+def _follows(tried: Tried, before: Tried) -> bool:
+    """Tell whether sensors do not contradict one another under a supposition, whatever was tried before."""
+    del before
     return tried.contradiction is None
 
 
 def _explains(tried: Tried) -> bool:
     """Tell whether a supposition leaves no more than noise."""
     return tried.found is not None and not leaves_more_than_noise(tried.found)
+
+
+def _explains_all(tried: Tried, before: Tried) -> bool:
+    """Tell whether a supposition leaves no more than noise, whatever was tried before."""
+    del before
+    return _explains(tried)
+
+
+def _explains_with_less(tried: Tried, before: Tried) -> bool:
+    """Tell whether a supposition leaves no more than noise, with fewer effects than what does so already."""
+    if not _explains(tried) or not _explains(before):
+        return _explains(tried)
+    assert tried.found is not None
+    assert before.found is not None
+    return tried.found.final.hypothesis.size < before.found.final.hypothesis.size
 
 
 def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:
@@ -272,11 +288,13 @@ def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
 
 
 def axes_as_written(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose that no board and no axes are turned, where turned ones leave more than noise.
+    """Suppose that no board and no axes are turned, where turned ones leave more than noise, or reverse axes again.
 
-    By a strong magnet beside it the field turns over along a low path, as if the board lay upside down.
+    By a strong magnet beside it the field turns over along a low path, as if the board lay upside down. Scales of -1
+    then turn it back.
     """
-    return None if _explains(tried) else _without(tried, question, BoardRotation, Axes)
+    undone = tried.fit is not None and with_reversed_axes(tried.prepared.setup, tried.fit) is not None
+    return None if _explains(tried) and not undone else _without(tried, question, BoardRotation, Axes)
 
 
 def _without(tried: Tried, question: Question, *types: type[Any]) -> SetupFindings | None:
@@ -298,8 +316,8 @@ def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
 #: what is supposed of the setup once effects were searched, one after the other, and the test of whether it stands
 _SUPPOSITIONS = (
     (likeliest_fault, _follows),
-    (times_as_written, _explains),
-    (axes_as_written, _explains),
+    (times_as_written, _explains_all),
+    (axes_as_written, _explains_with_less),
     (reversed_axes, _follows),
     (borne_out, _follows),
 )
