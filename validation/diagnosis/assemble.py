@@ -81,10 +81,13 @@ def _named(
     names: Sequence[str],
     choices: Sequence[Choice],
     advice: Mapping[tuple[str, str], Advice],
+    errors: FloatArray,
 ) -> NamedEffect:
-    """Return an effect as the answer has it; ``less`` is the fit without it, ``choices`` what others choose for it."""
+    """Return an effect as the answer has it; ``less`` is the fit without it, ``choices`` what others choose for it.
+
+    ``errors`` (p,) are those of the final fit's numbers.
+    """
     final = found.final
-    errors = beside_losses(final.fit, final.hypothesis.candidates, standard_errors(final))
     values = {}
     width = {q.key: q.sigma for q in parameters_of(candidate)}
     for q, value, error in zip(final.fit.parameters, final.fit.at, errors, strict=True):
@@ -488,7 +491,8 @@ def _outcome_of_search(
     choices = [] if unexplained else _choices(found, less)
     # where nothing explains it, the answer is about the baseline, or about the law that stands for all
     best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.fitted)
-    named = tuple(_named(found, candidate, less[candidate.name], names, choices, advice) for candidate in candidates)
+    errors = beside_losses(found.final.fit, candidates, standard_errors(found.final))
+    named = tuple(_named(found, one, less[one.name], names, choices, advice, errors) for one in candidates)
     named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
     partly = partly_explained(found, names) if unexplained and law is None else ()
     rows = None if unexplained else judged.tried.prepared.rows

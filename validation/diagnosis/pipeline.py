@@ -258,11 +258,10 @@ def _explains_all(tried: Tried, before: Tried) -> bool:
 
 def _explains_with_less(tried: Tried, before: Tried) -> bool:
     """Tell whether a supposition leaves no more than noise, with fewer effects than what does so already."""
-    if not _explains(tried) or not _explains(before):
-        return _explains(tried)
-    assert tried.found is not None
-    assert before.found is not None
-    return tried.found.final.hypothesis.size < before.found.final.hypothesis.size
+    if not _explains(tried):
+        return False
+    sizes = [np.inf if one.found is None else one.found.final.hypothesis.size for one in (tried, before)]
+    return sizes[0] < sizes[1] or not _explains(before)
 
 
 def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:

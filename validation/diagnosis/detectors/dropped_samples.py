@@ -46,6 +46,8 @@ __all__ = [
     "price_of_places",
     "recounted",
     "uncounted",
+    "with_losses",
+    "without_losses",
 ]
 
 
@@ -175,7 +177,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
         )
         counted = _counted(replace(found, trajectories=whole), sensor, _stated_sd(found, sensor, anew.noise))
         standing = replace(found, trajectories=whole).cut_at([one.nodes for one in new])
-        found = _with_losses(standing, counted, sensor)
+        found = with_losses(standing, counted, sensor)
     for _ in range(2):
         fitted = refit(replace(found, defects=plant.sizes.continuous), iterations=4)
         counted = _counted(fitted, sensor, _stated_sd(found, sensor, anew.noise))
@@ -183,7 +185,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
             np.array_equal(a.lost.get(sensor, 0.0), b.lost.get(sensor, 0.0))
             for a, b in zip(found.trajectories, counted.trajectories, strict=True)
         )
-        found = _with_losses(fitted, counted, sensor)
+        found = with_losses(fitted, counted, sensor)
         if same:
             break
     candidate, cost = _losses(found, sensor)
@@ -201,7 +203,7 @@ def _begun(whole: Trajectory, fit: Fit, i: int) -> Trajectory:
     return replace(whole, states=turned)
 
 
-def _with_losses(fit: Fit, counted: Fit, sensor: str) -> Fit:
+def with_losses(fit: Fit, counted: Fit, sensor: str) -> Fit:
     """Return a fit with the losses that the trajectories of another hold."""
     trajectories = tuple(
         replace(trajectory, lost={**trajectory.lost, sensor: other.lost[sensor]})
@@ -307,11 +309,16 @@ def begun_later(fit: Fit, sensor: str, recording: int, count: int) -> tuple[Shif
 def uncounted(fit: Fit, sensor: str) -> tuple[Fit, float]:
     """Return a fit whose trajectories hold no losses of a sensor, and what theirs had cost."""
     _, cost = _losses(fit, sensor)
+    return without_losses(fit, sensor), cost
+
+
+def without_losses(fit: Fit, sensor: str) -> Fit:
+    """Return a fit whose trajectories hold no losses of a sensor."""
     trajectories = tuple(
         replace(one, lost={other: counts for other, counts in one.lost.items() if other != sensor})
         for one in fit.trajectories
     )
-    return replace(fit, trajectories=trajectories), cost
+    return replace(fit, trajectories=trajectories)
 
 
 def _shifted(before: Fit, after: Fit, sensor: str, gain: float) -> tuple[Shifted, float]:

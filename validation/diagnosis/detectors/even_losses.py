@@ -11,18 +11,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import BoolArray, FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.validation.diagnosis.detectors.dropped_samples import price_of_places
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.continuous_fit import wider_with
 from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import NoiseModel
 from discsim.validation.identification.prediction import shown
 from discsim.validation.identification.readings import Readings, group_of
-from discsim.validation.identification.sensor_model import delay
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.sensor_model import Values, delay
 
-__all__ = ["beside_losses", "lost_as_well", "rather_lost"]
+__all__ = ["beside_losses", "by_one_sample", "lost_as_well", "place_of", "rather_lost", "sd_of_axes"]
 
 #: variance of what is anywhere within one sample, as of a reading that is rounded to it
 _SAWTOOTH = 1.0 / 12.0
@@ -44,7 +47,7 @@ def lost_as_well(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, floa
     lossy = next((one for one in CATALOGUE.values() if one.type is DroppedSamples and one.acts_on == row.acts_on), None)
     if row.type is not ClockRate or lossy is None or fit.plant.name in lossy.unseen_on:
         return None
-    place = _place_of(fit, candidate)
+    place = place_of(fit, candidate)
     if place is None:
         return None  # of a clock that is no part of the fit nothing is known
     share = 1.0 - float(fit.at[place])
@@ -96,15 +99,13 @@ def beside_losses(fit: Fit, candidates: Sequence[CandidateEffect], errors: Float
     for candidate in candidates:
         lost = rather_lost(fit, candidate)
         if lost is not None and lost[2] is not None:
-            place = _place_of(fit, candidate)
+            place = place_of(fit, candidate)
             assert place is not None
-            with_clock = fit.covariance[:, place] / fit.covariance[place, place]
-            walk = max(lost[2] ** 2 - float(fit.covariance[place, place]), 0.0)
-            errors = np.hypot(errors, np.abs(with_clock) * np.sqrt(walk))
+            errors = wider_with(errors, fit.covariance, place, lost[2])
     return errors
 
 
-def _place_of(fit: Fit, clock: CandidateEffect) -> int | None:
+def place_of(fit: Fit, clock: CandidateEffect) -> int | None:
     """Return the place of a clock's ratio among a fit's parameters; None where it is no part of the fit."""
     keys = [(q.group, q.recordings) for q in fit.parameters]
     wanted = (clock.id, clock.recordings)
@@ -118,7 +119,7 @@ def _evidence_of_walk(fit: Fit, candidate: CandidateEffect, sd: float | None) ->
     losses add the variance r v of their walk. Sizes that gain G by k freed numbers then have the likelihood of
     ``G r/(1 + r) - k log(1 + r)`` beside those of one clock. Nothing speaks for losses where no error is known.
     """
-    sizes, place = own_sizes(fit, candidate), _place_of(fit, candidate)
+    sizes, place = own_sizes(fit, candidate), place_of(fit, candidate)
     if sd is None or place is None or not sizes.freed:
         return -np.inf
     ratio = sd**2 / float(fit.covariance[place, place]) - 1.0
@@ -131,8 +132,22 @@ def _of_one_sample(fit: Fit, recording: int, readings: Readings) -> FloatArray:
     rate_hz = trajectory.recording.sheets[sensor].rate_hz
     if rate_hz <= 0.0:
         return np.full(len(readings.t), np.inf)
-    t = readings.t - delay(values, sensor, readings.t)
-    good = readings.good & ((t > 0.0) & (t + 1.0 / rate_hz < trajectory.nodes[-1]))[:, None]
-    moved = shown(trajectory, values, sensor, t + 1.0 / rate_hz) - shown(trajectory, values, sensor, t)
-    sd = np.array([fit.noise[group_of(sensor, axis)].sd for axis in range(moved.shape[1])])
-    return np.asarray(np.sum(np.where(good, moved / sd, 0.0) ** 2, axis=1))
+    moved, good = by_one_sample(trajectory, values, readings, readings.t - delay(values, sensor, readings.t))
+    return np.asarray(np.sum(np.where(good, moved / sd_of_axes(fit.noise, readings), 0.0) ** 2, axis=1))
+
+
+def by_one_sample(
+    trajectory: Trajectory, values: Values, readings: Readings, t: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return by how much one sample later moves readings (n, k) that were taken at ``t`` (n,) s; which of them count.
+
+    The sensor's rate is known.
+    """
+    later = t + 1.0 / trajectory.recording.sheets[readings.sensor].rate_hz
+    moved = shown(trajectory, values, readings.sensor, later) - shown(trajectory, values, readings.sensor, t)
+    return moved, readings.good & ((t > 0.0) & (later < trajectory.nodes[-1]))[:, None]
+
+
+def sd_of_axes(noise: NoiseModel, readings: Readings) -> FloatArray:
+    """Return the noise (k,) of a sensor's axes."""
+    return np.array([noise[group_of(readings.sensor, axis)].sd for axis in range(readings.value.shape[1])])

@@ -14,15 +14,16 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.validation.diagnosis.detectors.even_losses import by_one_sample, place_of, sd_of_axes
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.identification.gauss_newton import Fit, mapped
 from discsim.validation.identification.noise import NoiseModel
-from discsim.validation.identification.prediction import read, shown
-from discsim.validation.identification.readings import Readings, group_of
+from discsim.validation.identification.prediction import read
+from discsim.validation.identification.readings import Readings
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import Values, delay
 
-__all__ = ["price_of_walk", "walked", "without_walk"]
+__all__ = ["price_of_walk", "walked"]
 
 #: modes of a Brownian motion (Karhunen and Loeve); the others hold 1/(16 pi^2) of its variance each half
 _MODES = 16
@@ -81,18 +82,11 @@ def price_of_walk(fit: Fit, clock: CandidateEffect, noise: NoiseModel) -> float:
     return float(sum(walk.price(walk.held) for walk in walks))
 
 
-def without_walk(fit: Fit, sensor: str) -> Fit:
-    """Return a fit whose trajectories hold no walk of a sensor's losses."""
-    trajectories = tuple(
-        replace(one, lost={other: counts for other, counts in one.lost.items() if other != sensor})
-        for one in fit.trajectories
-    )
-    return replace(fit, trajectories=trajectories)
-
-
 def _walks(fit: Fit, clock: CandidateEffect, noise: NoiseModel) -> list[_Walk | None]:
     """Return the walk in each recording; None where the sensor has no readings."""
-    (share,) = [1.0 - float(v) for q, v in zip(fit.parameters, fit.at, strict=True) if q.group == clock.id]
+    place = place_of(fit, clock)
+    assert place is not None
+    share = 1.0 - float(fit.at[place])
 
     def one(i: int) -> _Walk | None:
         trajectory = fit.trajectories[i]
@@ -104,14 +98,13 @@ def _walks(fit: Fit, clock: CandidateEffect, noise: NoiseModel) -> list[_Walk | 
 
 def _walk(trajectory: Trajectory, values: Values, readings: Readings, share: float, noise: NoiseModel) -> _Walk:
     """Return the walk of a sensor's losses in one recording, ``share`` of its samples."""
-    sensor, (count, axes) = readings.sensor, readings.value.shape
+    sensor, count = readings.sensor, len(readings.t)
     rate_hz = trajectory.recording.sheets[sensor].rate_hz
     now = trajectory.lost.get(sensor, np.zeros(count))
     t = readings.t - delay(values, sensor, readings.t) + now / rate_hz
-    moved = shown(trajectory, values, sensor, t + 1.0 / rate_hz) - shown(trajectory, values, sensor, t)
-    sd = np.array([noise[group_of(sensor, axis)].sd for axis in range(axes)])
+    moved, good = by_one_sample(trajectory, values, readings, t)
+    sd = sd_of_axes(noise, readings)
     left = readings.value - read(trajectory, values, readings) + moved * now[:, None]
-    good = readings.good & ((t > 0.0) & (t + 1.0 / rate_hz < trajectory.nodes[-1]))[:, None]
     order = np.pi * (np.arange(1, _MODES + 1) - 0.5)
     size = np.sqrt(2.0 * count * share / (1.0 - share) ** 2) / order
     modes = np.sin(np.outer(np.arange(1, count + 1) / count, order)) * size

@@ -33,7 +33,7 @@ from discsim.validation.identification.residual_tests import UnmodelledResidual,
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import CLOCKS
 
-__all__ = ["ContinuousFit", "continuous_fit", "standard_errors"]
+__all__ = ["ContinuousFit", "continuous_fit", "standard_errors", "wider_with"]
 
 
 @dataclass(frozen=True)
@@ -262,11 +262,18 @@ def standard_errors(fitted: ContinuousFit) -> FloatArray:
         return np.full(len(fit.parameters), np.nan)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for place in _untold_clocks(fit):
-        # it may be anywhere that is stated, and every other number goes with it
-        variance = float(covariance[place, place])
-        beyond = max(fit.parameters[place].sigma ** 2 - variance, 0.0)
-        errors = np.hypot(errors, np.abs(covariance[:, place]) / variance * np.sqrt(beyond))
+        errors = wider_with(errors, covariance, place, fit.parameters[place].sigma)
     return errors
+
+
+def wider_with(errors: FloatArray, covariance: FloatArray, place: int, sd: float) -> FloatArray:
+    """Return errors (p,) as one number at ``place`` makes them that is known to ``sd`` only, and not to its covariance.
+
+    Every other number goes with it as their covariance (p, p) says.
+    """
+    variance = float(covariance[place, place])
+    beyond = max(sd**2 - variance, 0.0)
+    return np.asarray(np.hypot(errors, np.abs(covariance[:, place]) / variance * np.sqrt(beyond)))
 
 
 def _untold_clocks(fit: Fit) -> list[int]:

@@ -10,9 +10,16 @@ from dataclasses import replace
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.effects.setup import TimeOffset
-from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, begun_later, recounted, uncounted
+from discsim.validation.diagnosis.detectors.dropped_samples import (
+    Shifted,
+    begun_later,
+    recounted,
+    uncounted,
+    with_losses,
+    without_losses,
+)
 from discsim.validation.diagnosis.detectors.even_losses import rather_lost
-from discsim.validation.diagnosis.detectors.walk_of_losses import price_of_walk, walked, without_walk
+from discsim.validation.diagnosis.detectors.walk_of_losses import price_of_walk, walked
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import in_reach
@@ -60,7 +67,7 @@ def _walked(found: Search, current: ContinuousFit, sensor: str) -> tuple[Search,
             break
         found, current, has = _holding(found, again, sensor, cost - has), fitted, cost
     if has:
-        bare = without_walk(current.fit, sensor)
+        bare = without_losses(current.fit, sensor)
         fitted = _with_times_of(found, current, bare, -has)
         if fitted.score < current.score:
             return _holding(found, bare, sensor, -has), fitted
@@ -75,12 +82,8 @@ def _with_times_of(found: Search, current: ContinuousFit, again: Fit, dearer: fl
 
 def _holding(found: Search, fit: Fit, sensor: str, dearer: float) -> Search:
     """Return a search whose relaxed fit holds the losses of a sensor as a fit has them, none where that has none."""
-    trajectories = without_walk(found.relaxed_fit, sensor).trajectories
-    trajectories = tuple(
-        replace(one, lost={**one.lost, sensor: other.lost[sensor]}) if sensor in other.lost else one
-        for one, other in zip(trajectories, fit.trajectories, strict=True)
-    )
-    return replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=trajectories), cost=found.cost + dearer)
+    relaxed_fit = with_losses(without_losses(found.relaxed_fit, sensor), fit, sensor)
+    return replace(found, relaxed_fit=relaxed_fit, cost=found.cost + dearer)
 
 
 def _recounted(found: Search, current: ContinuousFit, sensor: str) -> tuple[Search, ContinuousFit]:
@@ -141,8 +144,7 @@ def _by_a_slow_clock(found: Search, current: ContinuousFit, sensor: str) -> tupl
     fitted = found.with_cost(fitted, -cheaper)
     if not fitted.score + price(clock) < current.score + price(losses):
         return found, current
-    relaxed_fit, _ = uncounted(found.relaxed_fit, sensor)
-    return replace(found, relaxed_fit=relaxed_fit, cost=found.cost - cheaper), fitted
+    return replace(found, relaxed_fit=without_losses(found.relaxed_fit, sensor), cost=found.cost - cheaper), fitted
 
 
 def _fitted(
@@ -160,9 +162,4 @@ def _fitted(
 def _taken(found: Search, sensor: str, again: tuple[Shifted, float]) -> Search:
     """Return a search whose relaxed fit holds other losses of a sensor."""
     shifted, dearer = again
-    trajectories = tuple(
-        replace(one, lost={**one.lost, sensor: other.lost[sensor]}) if sensor in other.lost else one
-        for one, other in zip(found.relaxed_fit.trajectories, shifted.trajectories, strict=True)
-    )
-    relaxed_fit = replace(found.relaxed_fit, trajectories=trajectories)
-    return replace(found, relaxed_fit=relaxed_fit, cost=found.cost + dearer)
+    return replace(found, relaxed_fit=with_losses(found.relaxed_fit, shifted.fit, sensor), cost=found.cost + dearer)

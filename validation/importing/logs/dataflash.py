@@ -34,9 +34,8 @@ FIELDS = {
     "MAG": (("magnetometer", "Mag", 0.1, "Health"),),
 }
 FAST = "GYR and ACC"
-#: The description of a message in a log as text, and how far from its beginning the first of them is looked for.
+#: The description of a message in a log as text.
 _DESCRIBED = re.compile(rb"(?:^|\n)FMT, ?\d+, ?\d+, ?\w+, ?\w+, ?\w+,")
-_HEAD = 1 << 12
 #: Status of GPS from which on there is a height: 3 is a fix in three dimensions.
 FIX_3D = 3
 #: Bytes at most that pad a page of a log of blocks: 256, less a header of 6 and one byte (pymavlink's DFReader).
@@ -60,7 +59,7 @@ def read(raw: Path) -> Log:
     from pymavlink.DFReader import DFReader_binary, DFReader_text
 
     with raw.open("rb") as stream:
-        text = _is_text(stream.read(_HEAD))
+        text = stream.read(len(MAGIC)) != MAGIC
     said = io.StringIO()  # it prints what it finds damaged, and its part in C a line for each such byte
     rows, got = Rows(), 0
     with (

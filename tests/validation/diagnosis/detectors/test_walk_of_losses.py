@@ -13,7 +13,8 @@ from discsim.effects import effect
 from discsim.effects.catalogue import Effect
 from discsim.validation.challenge.blind import Request
 from discsim.validation.challenge.cases.conceal import recordings
-from discsim.validation.diagnosis.detectors.walk_of_losses import price_of_walk, walked, without_walk
+from discsim.validation.diagnosis.detectors.dropped_samples import without_losses
+from discsim.validation.diagnosis.detectors.walk_of_losses import price_of_walk, walked
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
@@ -56,7 +57,7 @@ def test_the_walk_about_a_clock_ends_where_so_many_samples_are_lost():
     # what it costs once it is held is what it cost
     assert price_of_walk(again, clock, found.relaxed_noise) == pytest.approx(cost, rel=0.1)
     assert price_of_walk(fitted.fit, clock, found.relaxed_noise) == 0.0
-    assert all(SENSOR not in one.lost for one in without_walk(again, SENSOR).trajectories)
+    assert all(SENSOR not in one.lost for one in without_losses(again, SENSOR).trajectories)
 
 
 def test_a_search_holds_the_walk_where_it_gains_and_leaves_noise_alone():
