@@ -49,6 +49,9 @@ SEEN = 0.02
 WINDOWS, SUM = 8, 0.015
 #: Fewest rows that show a spin.
 FEWEST = 8
+#: A register's span is this many of the least steps between readings at least: the smallest part (+-125 deg/s) written
+#: in whole deg/s has 250. What leaps by a few steps lies at rest.
+FEWEST_STEPS = 200.0
 
 
 class Continued(NamedTuple):
@@ -103,7 +106,7 @@ def _span(v: FloatArray, step: FloatArray, leap: BoolArray, unit: float | None) 
     best = int(np.nanargmin(unknown))
     span = _of_a_part(float(spans[best]), float(unknown[best]), unit)
     real = np.abs(spans / span - 1) < SMOOTH
-    if not real.any() or not REACHED[0] < 2 * peak / span < REACHED[1]:
+    if not real.any() or not REACHED[0] < 2 * peak / span < REACHED[1] or span < FEWEST_STEPS * _unit_of(v):
         return None
     return span, real
 

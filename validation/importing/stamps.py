@@ -46,6 +46,10 @@ _DIGITS = re.compile(
     r"((?:19|20)\d{2})[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])[-_T\s]?"
     r"([01]\d|2[0-3])[-_]?([0-5]\d)[-_]?([0-5]\d)(?:[-_.,]?(\d{1,9}))?Z?"
 )
+#: The same without leading zeros, milliseconds behind the last dash: 2024-3-23--13-41-39-25.
+_DASHES = re.compile(
+    r"((?:19|20)\d{2})-(\d{1,2})-(\d{1,2})[-_T\s]{1,3}(\d{1,2})-(\d{1,2})-(\d{1,2})(?:-(\d{1,3})|[.,](\d{1,9}))?Z?"
+)
 
 
 def iso_seconds(cell: str) -> float | None:
@@ -59,6 +63,8 @@ def iso_seconds(cell: str) -> float | None:
     (60.5, 43200.123, 60.5)
     >>> iso_seconds("Sat Jan  1 00:01:00 2000"), iso_seconds("Jan 1, 2000 @ 00:01:00"), iso_seconds("20000101000100500")
     (60.0, 60.0, 60.5)
+    >>> iso_seconds("2000-1-1--0-1-0-25")
+    60.025
     """
     text = cell.strip().strip('"')
     if _TIME_OF_DAY.fullmatch(text):
@@ -71,6 +77,10 @@ def iso_seconds(cell: str) -> float | None:
     if digits := _DIGITS.fullmatch(text):
         year, month, day, *clock, fraction = digits.groups()
         return _since_2000(year, month, day, _time_of_day(f"{':'.join(clock)}.{fraction or 0}"))
+    if dashes := _DASHES.fullmatch(text):
+        year, month, day, *clock, thousandths, fraction = dashes.groups()
+        padded = ":".join(part.zfill(2) for part in clock)
+        return _since_2000(year, month, day, _time_of_day(f"{padded}.{fraction or (thousandths or '').zfill(3)}"))
     # the fraction is taken by itself: datetime drops what is below a microsecond
     head, dot, tail = text.replace(",", ".").partition(".")
     behind = re.match(r"\d+", tail)
@@ -109,7 +119,9 @@ def stamp_seconds(cells: Iterable[str]) -> tuple[FloatArray, IntArray]:
 
 def is_stamp(cell: str) -> bool:
     """Tell whether a cell is a date with a time, or a time of day."""
-    return (":" in cell and iso_seconds(cell) is not None) or _DIGITS.fullmatch(cell.strip().strip('"')) is not None
+    text = cell.strip().strip('"')
+    told = ":" in cell or _DASHES.fullmatch(text) is not None
+    return (told and iso_seconds(cell) is not None) or _DIGITS.fullmatch(text) is not None
 
 
 def _time_of_day(text: str) -> float | None:

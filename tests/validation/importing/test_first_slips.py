@@ -149,3 +149,18 @@ def test_a_third_column_without_numbers_is_named(tmp_path):
     columns = [("t_s", LOG.t), ("gx", LOG.gyro[:, 0]), ("gy", ["NaN"] * LOG.t.size), ("gz", LOG.gyro[:, 2])]
     raw = write_table(tmp_path / "log.csv", [*columns, *three(named("a{}"), LOG.accel)])
     assert "x and z were found and y was not: 'gy' is there and holds too few numbers" in import_log(raw).summary()
+
+
+def test_a_time_in_front_stays_the_first_column_where_the_last_has_no_name(tmp_path):
+    raw = tmp_path / "log.csv"
+    rows = [
+        f"2021-10-24-08:46:{6 + t:09.6f},{','.join(f'{v:.5f}' for v in (*mag, *accel, *gyro))},24.8,41.1"
+        for t, mag, accel, gyro in zip(LOG.t, LOG.mag, LOG.accel, LOG.gyro / DEG, strict=True)
+    ]
+    names = "Time,MagX,MagY,MagZ,AccelX,AccelY,AccelZ,GyroX,GyroY,GyroZ,Temp Hum"
+    raw.write_text("\n".join([names, *rows, ""]))
+    found = import_log(raw)
+    assert "the header has 11 names for 12 columns: the last is taken to have none" in found.summary()
+    samples = found.recordings[0].samples
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
+    assert_allclose(samples["magnetometer"].value[:, 0], LOG.mag[:, 0], atol=1e-4)

@@ -32,7 +32,7 @@ COLUMNS = {"time_ms": [t for t, *_ in ROWS]} | {
 }
 
 
-def lines(records: list[dict[str, Any]]) -> str:
+def lines(records: list[Any]) -> str:
     return "\n".join([*map(json.dumps, records), ""])
 
 
@@ -42,6 +42,13 @@ FORMS: dict[str, Callable[[], str]] = {
     "a list, indented": lambda: json.dumps(NESTED, indent=2),
     "a list under a heading": lambda: json.dumps({"device": "disc-3", "session": {"hz": 200}, "data": NESTED}),
     "dictionaries as Python prints them": lambda: "\n".join(map(str, NESTED)),
+    "lists of a time and an object": lambda: json.dumps(
+        [[t, {"g": dict(zip("xyz", gyro, strict=True)), "a": accel, "m": mag}] for t, gyro, accel, mag in ROWS],
+        indent=2,
+    ),
+    "a list of a time and objects a line": lambda: lines(
+        [[str(t), {"gyro": gyro}, {"accel": accel}, {"mag": mag}] for t, gyro, accel, mag in ROWS]
+    ),
     "a row for each sensor": lambda: json.dumps(LONG),
     "messages of several rows": lambda: lines(
         [{"id": k, "payload": LONG[k : k + 60]} for k in range(0, len(LONG), 60)]
@@ -53,6 +60,9 @@ FORMS: dict[str, Callable[[], str]] = {
     ),
     "rows under the names of their columns": lambda: json.dumps(
         {"columns": [*COLUMNS], "data": [list(row) for row in zip(*COLUMNS.values(), strict=True)]}
+    ),
+    "rows beside a header with their names": lambda: json.dumps(
+        {"header": {"hz": 200, "names": [*COLUMNS]}, "samples": list(zip(*COLUMNS.values(), strict=True))}
     ),
 }
 
@@ -69,6 +79,68 @@ def test_the_log_is_the_same_in_each_form(tmp_path, form):
     assert "magnetometer" in samples
     assert "log.json: JSON, read as a table of its records" in found.summary()
     assert len(found.throws) == 1
+
+
+def columns_of_each(every_mag: int) -> dict[str, dict[str, list[float]]]:
+    """Return a log as columns under each sensor's name, the magnetometer at fewer rows."""
+    parts = {kind: ROWS[:: every_mag if kind == "magnetometer" else 1] for kind in KINDS}
+    return {
+        kind: {"t": [row[0] for row in rows]} | {axis: [row[1 + k][j] for row in rows] for j, axis in enumerate("xyz")}
+        for k, (kind, rows) in enumerate(parts.items())
+    }
+
+
+def one_clock_for_two() -> dict[str, Any]:
+    columns = columns_of_each(2)
+    time = columns["gyroscope"].pop("t")
+    assert columns["accelerometer"].pop("t") == time
+    return {**columns, "time_ms": time}
+
+
+OWN_RATES: dict[str, Callable[[], Any]] = {
+    "columns": lambda: columns_of_each(2),
+    "rows of t, x, y, z": lambda: {
+        kind: list(zip(*columns.values(), strict=True)) for kind, columns in columns_of_each(2).items()
+    },
+    "one clock for two of them": one_clock_for_two,
+}
+
+
+@pytest.mark.parametrize("form", OWN_RATES)
+def test_sensors_of_unlike_rates_in_one_object_are_a_table_each(tmp_path, form):
+    raw = tmp_path / "log.json"
+    raw.write_text(json.dumps({"device": "disc-3", **OWN_RATES[form]()}))
+    samples = import_log(raw).recordings[0].samples
+    assert {*samples} == set(KINDS)
+    assert samples["gyroscope"].t.size == len(ROWS)
+    assert samples["magnetometer"].t.size == (len(ROWS) + 1) // 2
+    assert_allclose(samples["magnetometer"].t[:9], LOG.t[:18:2], atol=1e-6)
+
+
+LISTS = [[t, *gyro, *accel, *mag] for t, gyro, accel, mag in ROWS]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [json.dumps(LISTS), json.dumps(LISTS, indent=1), lines(LISTS)],
+    ids=["one line", "indented", "a list a line"],
+)
+def test_lists_of_numbers_in_a_list_are_a_table_without_names(tmp_path, text):
+    raw = tmp_path / "log.json"
+    raw.write_text(text)
+    samples = import_log(raw).recordings[0].samples
+    assert {*samples} == set(KINDS)
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
+
+
+def test_lists_may_have_names_in_the_first_and_break_off(tmp_path):
+    whole = json.dumps([[*COLUMNS], *LISTS])
+    raw = tmp_path / "log.json"
+    raw.write_text(whole[: len(whole) - 20])
+    found = import_log(raw)
+    assert found.recordings[0].samples["accelerometer"].t.size == len(ROWS) - 1
+    raw.write_text(json.dumps([[*COLUMNS], *LISTS[:5], [1, 2], *LISTS[5:]]))
+    assert "log.json: 1 of another length LEFT OUT" in import_log(raw).summary()
 
 
 def test_what_breaks_off_is_left_out_aloud(tmp_path):
@@ -110,8 +182,9 @@ def test_a_file_for_each_sensor_beside_a_description_is_one_log(tmp_path):
         ('[{"x": 1},', "is JSON without records of numbers in it"),
         (lines([{f"k{k}_{j}": 1 for j in range(300)} for k in range(4)]), "is JSON of 1200 columns"),
         (lines([{"x": k, "name": "a"} for k in range(9)]), "no sensor of motion found"),
+        ("[[1, 2, 3], [4, 5, 6]]", "is JSON of lists without rows of numbers"),
     ],
-    ids=["description", "deep", "broken off", "wide", "other"],
+    ids=["description", "deep", "broken off", "wide", "other", "few lists"],
 )
 def test_json_without_a_log_in_it_is_refused_with_what_is_expected(tmp_path, text, what):
     raw = tmp_path / "log.json"

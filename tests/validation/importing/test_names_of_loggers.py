@@ -47,7 +47,11 @@ def test_the_y_of_velocity_is_no_axis(axis):
     assert (name.axis, sensor_of(name.base)) == (axis, "gyroscope")
 
 
-@pytest.mark.parametrize("names", [("p", "q", "r"), ("P", "Q", "R"), ("roll_rate", "pitch_rate", "yaw_rate")])
+@pytest.mark.parametrize(
+    "names",
+    [("p", "q", "r"), ("P", "Q", "R"), ("roll_rate", "pitch_rate", "yaw_rate"),
+     ("Rate_X", "Rate_Y", "Rate_Z")],
+)  # fmt: skip
 def test_the_rates_of_flight_mechanics_are_a_gyroscope(tmp_path, names):
     columns = [("time_us", 1e6 * LOG.t), ("roll", 0 * LOG.t), ("pitch", 0 * LOG.t), ("yaw", 0 * LOG.t)]
     columns += [*three(names, LOG.gyro), *three(["ax", "ay", "az"], LOG.accel)]
@@ -128,3 +132,30 @@ def test_an_acceleration_that_is_called_linear_and_rests_on_gravity_is_a_reading
     columns += three([f"Lin Acc {axis}" for axis in "XYZ"], LOG.accel + np.array([0.0, 0.0, gravity]))
     columns += three([f"Mag Field {axis}" for axis in "XYZ"], LOG.mag)
     assert len(import_log(write_table(tmp_path / "log.csv", columns)).recordings[0].samples) == sensors
+
+
+def test_what_a_program_converted_goes_before_the_counts_beside_it(tmp_path):
+    names = [f"imu1_{sensor}_{axis}" for sensor in ("accel", "gyro") for axis in "xyz"]
+    counts = np.column_stack([LOG.accel * 139.3, LOG.gyro * 3274.0]).round()
+    columns = [("timestamp_ms", 1000 * LOG.t), *zip(names, counts.T, strict=True)]
+    columns += zip([f"{name}_real" for name in names], np.column_stack([LOG.accel, LOG.gyro]).T, strict=True)
+    samples = import_log(write_table(tmp_path / "log.csv", columns)).recordings[0].samples
+    assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-3)
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-3)
+
+
+def test_a_unit_that_makes_a_row_of_seconds_is_doubted_beside_positions_too(tmp_path):
+    """Where fixes come once a minute, readings of a gyroscope do not."""
+    motion = [*three(["gx_dps", "gy_dps", "gz_dps"], LOG.gyro / DEG), *three(["ax", "ay", "az"], LOG.accel)]
+    place = [("gps_lat", 0 * LOG.t + 44.8), ("gps_long", 0 * LOG.t - 73.1)]
+    columns = [("timestamp_s", 1393343 + 1000 * LOG.t), *motion, *place]
+    found = import_log(write_table(tmp_path / "log.csv", columns))
+    assert_allclose(found.recordings[0].samples["gyroscope"].t, LOG.t, atol=1e-3)
+    assert "time: 'timestamp_s' in ms (guess: the header says s, which is a row every 5 s" in found.summary()
+
+
+def test_where_a_row_stands_in_a_memory_is_no_time_of_it(tmp_path):
+    place = 2174656 + 64 * np.arange(LOG.t.size)
+    rows = np.column_stack([place, (4.1 * LOG.t * 1000).round(), LOG.gyro / DEG / 4.1, LOG.accel / G0])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", fmt=["%d", "%d", *["%.4f"] * 6])
+    assert import_log(tmp_path / "log.csv").recordings[0].samples["gyroscope"].t[-1] > 35.0

@@ -51,3 +51,15 @@ def test_a_pull_in_g_that_a_hand_turns_slowly_has_length_1_too_and_is_read(tmp_p
     rows = np.column_stack([np.arange(600) * 0.01, accel, np.zeros(600)])
     np.savetxt(raw, rows, delimiter=",", fmt="%.4f", header="t,ax,ay,az,button", comments="")
     assert set(import_log(raw).recordings[0].samples) == {"accelerometer"}
+
+
+@pytest.mark.parametrize("names", ["q_w,q_x,q_y,q_z", "Q0(),Q1(),Q2(),Q3()", "quat.w,quat.x,quat.y,quat.z"])
+def test_what_is_called_a_quaternion_is_no_magnetometer_before_it_turns(tmp_path, names):
+    raw = tmp_path / "log.csv"
+    accel = made_log().accel[:100] + np.array([3.0, 0.0, 0.0]) * np.sin(LOG.t[:100, None])
+    still = Rotation.from_euler("xyz", [40.0, 5.0, 3.0], degrees=True).as_quat(scalar_first=True)
+    rows = np.column_stack([LOG.t[:100], accel, still + 0.005 * np.sin(9 * LOG.t[:100, None] + np.arange(4))])
+    np.savetxt(
+        raw, rows, delimiter=",", fmt=["%.3f"] * 4 + ["%.2f"] * 4, header=f"time_s,ax,ay,az,{names}", comments=""
+    )
+    assert set(import_log(raw).recordings[0].samples) == {"accelerometer"}

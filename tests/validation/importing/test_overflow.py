@@ -142,3 +142,9 @@ def test_readings_within_the_register_are_left_as_they_are():
     noise = np.random.default_rng(1).uniform(-34.9, 34.9, 500)
     assert continued(noise, 1 / RATE, 1e-7) is None
     assert continued(np.full(20, np.nan), 1 / RATE) is None
+
+
+def test_a_gyroscope_at_rest_that_is_written_coarsely_does_not_overflow():
+    steps = np.array([-3, 0, 0, 4, 1, -3, 0, 0, -1, 0, 1, 3, 2, 1, 1, 1, 0, 0, -1, 1, 0, -1, 1, 1, 0, -1, -1, 0], float)
+    assert continued(0.1 * DEG * steps, 0.001, 0.1 * DEG) is None
+    assert continued(0.1 * np.sign(steps), 0.001) is None

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.made_logs import made_log
+from support.made_logs import DEG, made_log
 
 from discsim.errors import InputError
 from discsim.recording import Recording
@@ -141,3 +141,42 @@ time = "t_gyro"
     (tmp_path / "map.toml").write_text(text)
     with pytest.raises(InputError, match="names a column of time stamps; expected 'column' in \\[time\\] too"):
         read_map(tmp_path / "map.toml")
+
+
+NAMES = [("time_ms", 1e3, "time_ms", 1e3, "t", 1.0), ("time_ms", 1e3, "elapsed (s)", 1.0, "timestamp_us", 1e6)]
+
+
+def folder_of(place: Path, names: tuple[str, float, str, float, str, float], start: float = 0.0) -> Path:
+    """Write a file for each sensor; the magnetometer's has every second row, and may begin later by its own clock."""
+    log = made_log()
+    place.mkdir()
+    files = zip(("gyro", "accel", "mag"), names[::2], names[1::2], (log.gyro / DEG, log.accel, log.mag), strict=True)
+    for file, name, scale, value in files:
+        every, late = (2, start) if file == "mag" else (1, 0.0)
+        rows = np.column_stack([(log.t + late) * scale, value])[::every]
+        np.savetxt(place / f"{file}.csv", rows, delimiter=",", fmt="%.6f", header=f"{name},x,y,z", comments="")
+    return place
+
+
+@pytest.mark.parametrize("names", NAMES)
+def test_a_file_that_calls_its_time_otherwise_is_read_by_it(tmp_path, names):
+    recording, said = imported(folder_of(tmp_path / "log", names))
+    log = made_log()
+    assert {*recording.samples} == {"gyroscope", "accelerometer", "magnetometer"}
+    assert_allclose(recording.samples["magnetometer"].t, log.t[::2], atol=1e-6)
+    assert_allclose(recording.samples["magnetometer"].value, log.mag[::2], atol=1e-3)
+    assert f"that file has no '{names[0]}'" in said
+
+
+def test_a_file_on_another_clock_is_left_out_aloud(tmp_path):
+    recording, said = imported(folder_of(tmp_path / "log", NAMES[0], start=5000.0))
+    assert {*recording.samples} == {"gyroscope", "accelerometer"}
+    assert "WARNING: left out: magnetometer of mag.csv: its time 't' runs from 5000 to 5009.99 s" in said
+
+
+def test_a_file_without_stamps_beside_others_with_them_is_left_out_aloud(tmp_path):
+    place = folder_of(tmp_path / "log", NAMES[0])
+    np.savetxt(place / "mag.csv", made_log().mag, delimiter=",", fmt="%.3f", header="x,y,z", comments="")
+    recording, said = imported(place)
+    assert {*recording.samples} == {"gyroscope", "accelerometer"}
+    assert "WARNING: left out: magnetometer of mag.csv: it has no column 'time_ms', which is the others' time" in said

@@ -77,3 +77,23 @@ def test_a_column_that_is_not_there_is_asked_for_by_its_name(tmp_path):
     raw = written(tmp_path / "log.csv", np.arange(SIZE))
     with pytest.raises(InputError, match="no column 'when' to put rows in order by"):
         read_raw(raw, Layout(sorted_by="when"), RepairList(()))
+
+
+def test_rows_that_were_sorted_by_the_letters_of_their_stamps_fill_the_gaps_that_they_left(tmp_path):
+    """Milliseconds without zeros before them: 39-90 stands behind 39-871."""
+    at = [f"2024-3-23--13-41-{39 + ms // 1000}-{ms % 1000}" for ms in (1000 * LOG.t).round().astype(int).tolist()]
+    log = import_log(written(tmp_path / "log.csv", np.argsort(at), at))
+    read = log.recordings[0].samples["gyroscope"]
+    assert_allclose(read.t, LOG.t, atol=1e-5)
+    assert_allclose(read.value[:, 2], LOG.gyro[:, 2], atol=1e-6)
+    assert "rows stand out of order" in log.summary()
+
+
+def test_wild_stamps_of_a_log_that_stands_in_order_move_no_row(tmp_path):
+    stamps = [f"{t:.4f}" for t in LOG.t]
+    for k in range(20, SIZE - 20, 40):
+        stamps[k] = f"{0.7 * LOG.t[k]:.4f}"
+    log = import_log(written(tmp_path / "log.csv", np.arange(SIZE), stamps))
+    assert "out of order" not in log.summary().partition("WARNING")[0]
+    kept = log.recordings[0].samples["gyroscope"]
+    assert_allclose(kept.value[:, 2], np.interp(kept.t, LOG.t, LOG.gyro[:, 2]), atol=1e-6)

@@ -111,3 +111,14 @@ def test_minutes_that_nothing_states_are_told_by_what_turns(tmp_path):
 def test_what_turns_overrides_a_stated_unit_as_far_as_the_clock_is_sure(clock, turned, unit):
     value = np.column_stack([0 * COUNT, 0 * COUNT, np.linspace(0.0, 30.0, COUNT.size)])
     assert gyroscope_unit(value, Reading("gyroscope", "deg/s"), turned, clock=clock).unit == unit
+
+
+def test_seconds_with_decimals_of_a_slow_log_are_no_milliseconds(tmp_path):
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.normal(0.51, 0.02, 70))
+    turn = np.sin(0.2 * t)[:, None] * [3.0, 5.0, 24.0] + rng.normal(0.0, 0.1, (70, 3))
+    rows = np.column_stack([t, rng.normal([0.0, 0.6, -9.8], 0.02, (70, 3)), turn])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="Time,AccX,AccY,AccZ,GyrX,GyrY,GyrZ", comments="")
+    found = import_log(tmp_path / "log.csv")
+    assert found.recordings[0].samples["gyroscope"].t[-1] > 30.0
+    assert "'Time' in s (guess: stamps with decimals 0.508 apart; in ms the log would last 0.035 s)" in found.summary()

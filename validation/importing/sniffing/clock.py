@@ -43,6 +43,8 @@ EPOCH = (1e9, 3e9)
 SPACING = (5e-5, 0.5)
 #: ... and fixes of a satellite receiver come twenty times a second to once a minute.
 SLOWEST_FIX = 60.0
+#: A log that lasts less than a second is none: where stamps make one, and rows in seconds come at 0.5 Hz at least.
+SHORTEST_LOG, SLOWEST_ROWS = 1.0, 2.0
 #: Few loggers of motion write more than 1000 rows a second: a unit by which one does is a guess.
 FASTEST_USUAL = 1e-3
 #: Loggers without time stamps write 100 rows a second more often than any other number; all rates scale with it.
@@ -62,6 +64,8 @@ OFF_GUESSED, OFF_STATED = 0.7, 0.03
 #: Share of a sensor's rows at the stamp of its row before, with other readings, above which its clock is coarser than
 #: its rows: as many as are left out by themselves without a warning.
 SHARED = 0.05
+#: Bytes of a row in a memory, at least.
+LEAST_PLACE = 16
 #: What is said of a counter under a name of time.
 COUNTING = "goes up by one a row: it counts the rows and tells no time"
 
@@ -189,7 +193,15 @@ def _rank(numbers: Numbers, k: int, clock: Clock) -> float:
     """Return how far a column stands back; one of a message's header is when it was measured, not when it came."""
     named = is_time_name(numbers.names[k])
     measured = {"header", "stamp"} <= words_of(numbers.names[k])
-    return {"certain": 0, "likely": 1, "guess": 2}[clock.decision.sure] + (0 if named else 3) - 0.25 * measured
+    place = not named and _is_place(numbers.values[:, k])
+    return {"certain": 0, "likely": 1, "guess": 2}[clock.decision.sure] + (0 if named else 3) - 0.25 * measured + place
+
+
+def _is_place(value: FloatArray) -> bool:
+    """Tell where each row stands in a memory: whole numbers that go up by one and the same power of two from 16 on."""
+    step = np.diff(value[np.isfinite(value)])
+    same = step.size > 0 and bool(np.all(step == step[0])) and step[0] >= LEAST_PLACE
+    return same and float(step[0]).is_integer() and int(step[0]) & (int(step[0]) - 1) == 0
 
 
 def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
@@ -209,7 +221,7 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     header, even = numbers.dialect.has_header, named or _evenly(value, spoken)
     if not named and ((header and k > 1) or ((header or k > 1) and not even)):
         return None
-    slowest = SLOWEST_FIX if numbers.tells_positions else SPACING[1]
+    slowest = SLOWEST_FIX if numbers.tells_positions and not numbers.names_motion else SPACING[1]
     unit, sure, why_unit = _unit(value, spoken, slowest, _of_one_sensor(numbers, value))
     if unit is None:
         return None
@@ -335,8 +347,12 @@ def _unit(
     fits = [unit for unit in fits if not (whole and unit == "s")]
     # of several the one whose rate is nearest 100 Hz on a logarithmic scale, where loggers are
     unit = min(fits, key=lambda unit: abs(np.log(step * SCALES[unit] / STEP)))
+    lasts = (largest - float(np.nanmin(value))) * SCALES[unit]
+    if not whole and step <= SLOWEST_ROWS and lasts < SHORTEST_LOG:
+        return "s", "guess", f"stamps with decimals {step:.3g} apart; in {unit} the log would last {lasts:.2g} s"
     sure = "likely" if len(fits) == 1 or FASTEST_USUAL <= step * SCALES[unit] <= 0.1 else "guess"
-    return unit, sure, f"whole numbers {step:.4g} apart: {1 / (step * SCALES[unit]):.4g} rows a second"
+    what = "whole numbers" if whole else "stamps with decimals"
+    return unit, sure, f"{what} {step:.4g} apart: {1 / (step * SCALES[unit]):.4g} rows a second"
 
 
 def _days(value: FloatArray, step: float) -> bool:

@@ -304,7 +304,7 @@ def _fitting(cells: list[str], width: int, rows: list[list[str]], layout: Layout
     if len(cells) == width - 1:
         if not rows[0][-1]:
             return (*cells, "")
-        return ("", *cells) if _counts(rows) else (*cells, UNNAMED)
+        return ("", *cells) if _counts(rows) and not _begins_with_time(cells, rows) else (*cells, UNNAMED)
     return None
 
 
@@ -314,6 +314,15 @@ def _counts(rows: list[list[str]]) -> bool:
     if not (first.isdecimal() and second.isdecimal()):
         return not re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?", first)
     return int(second) - int(first) == 1
+
+
+def _begins_with_time(cells: list[str], rows: list[list[str]]) -> bool:
+    """Tell names whose first is called after time, above records that begin with a date, or with no count of rows."""
+    from discsim.validation.importing.sniffing.names import is_time_name
+    from discsim.validation.importing.stamps import is_stamp
+
+    first = rows[0][0].strip().strip("\"'")
+    return is_time_name(cells[0]) and (is_stamp(first) or (first.isdecimal() and int(first) > 1))
 
 
 def _names_sensors(cells: list[str]) -> bool:

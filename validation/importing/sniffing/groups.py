@@ -20,6 +20,7 @@ from discsim.validation.importing.sniffing.dialect import Dialect
 from discsim.validation.importing.sniffing.names import (
     Name,
     is_of_mavlink,
+    is_of_quaternion,
     last_word,
     penalty_of,
     read_name,
@@ -64,6 +65,11 @@ class Numbers:
         return set(SENSORS["gps"].columns) <= set(self.table.columns) or self.degrees is not None
 
     @cached_property
+    def names_motion(self) -> bool:
+        """Whether three columns or more are called after a gyroscope, an accelerometer or a magnetometer."""
+        return sum(sensor_of(read_name(name).base) is not None for name in self.names) > 2
+
+    @cached_property
     def degrees(self) -> tuple[int, int] | None:
         """The columns that are called a latitude and a longitude; None where there are none."""
         words = [last_word(name) for name in self.names]
@@ -95,7 +101,8 @@ class Numbers:
     def orientations(self) -> tuple[tuple[int, int, int, int], ...]:
         """Four neighbours each that are the quaternion of a fused orientation: no sensor's, of length 1 as it turns.
 
-        A pull in g that a hand turns slowly has that length, too, and is told by its names.
+        A pull in g that a hand turns slowly has that length, too, and is told by its names. Four that are called a
+        quaternion are one before they turn.
         """
         found: list[tuple[int, int, int, int]] = []
         for k in range(len(self.names) - 3):
@@ -106,7 +113,8 @@ class Numbers:
                 continue
             spans = np.ptp(four, axis=0)
             # a column of noughts behind a pull is a button's
-            if spans.max() > _TURNED and spans[3] > 0.0 and _is_unit(four):
+            turned = spans.max() > _TURNED and spans[3] > 0.0
+            if (turned or all(map(is_of_quaternion, self.names[k : k + 4]))) and _is_unit(four):
                 found.append((k, k + 1, k + 2, k + 3))
         return tuple(found)
 

@@ -14,6 +14,7 @@ __all__ = [
     "foreign_words",
     "is_called_linear",
     "is_of_mavlink",
+    "is_of_quaternion",
     "is_spacing_name",
     "is_time_name",
     "last_word",
@@ -63,7 +64,8 @@ _RANGES = ("high", "low")
 #: A column that stands this far back is no sensor's reading.
 NO_READING = 9
 #: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration
-#: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
+#: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back; what a
+#: program converted goes before the counts beside it.
 _STAND_BACK = {
     NO_READING: (
         "lin linear user fe fl ned enu earth world ohne without sans senza gravity err error bias offset setpoint "
@@ -72,6 +74,7 @@ _STAND_BACK = {
     ),
     2: "uncal uncalibrated unfilt debug 2 second motion",
     1: "filt filtered lpf",
+    -1: "real si scaled converted",
 }
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
 _AS_READ = re.compile(r"\bang(?:ular)?[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
@@ -120,8 +123,8 @@ def foreign_words(text: str) -> int:
     return sum(len(stem) for stem in _FOREIGN if stem in plain)
 
 
-#: The rates about a body's axes as flight mechanics calls them, and the axis of each.
-_RATES = {"p": 0, "q": 1, "r": 2, "rollrate": 0, "pitchrate": 1, "yawrate": 2}
+#: The rates about a body's axes as flight mechanics and inertial units call them, and the axis of each.
+_RATES = {"p": 0, "q": 1, "r": 2, "rollrate": 0, "pitchrate": 1, "yawrate": 2, "ratex": 0, "ratey": 1, "ratez": 2}
 
 
 def _without_axis(name: str) -> tuple[str, int | None]:
@@ -146,8 +149,8 @@ def _without_axis(name: str) -> tuple[str, int | None]:
 def read_name(name: str) -> Name:
     """Take a column's name apart.
 
-    >>> read_name("Gyro X (deg/s)"), read_name("yaw_rate")
-    (Name(base='Gyro', axis=0, unit='deg/s'), Name(base='rotrate', axis=2, unit=''))
+    >>> read_name("Gyro X (deg/s)"), read_name("yaw_rate"), read_name("Rate_Z").base
+    (Name(base='Gyro', axis=0, unit='deg/s'), Name(base='rotrate', axis=2, unit=''), 'rotrate')
     """
     rest, unit = split_unit(name.strip())
     if (axis := _RATES.get(re.sub(r"[\s_\-]+", "", rest.lower()))) is not None:
@@ -185,6 +188,16 @@ def is_of_mavlink(name: str) -> bool:
     [True, True, True, False, False]
     """
     return re.fullmatch(r"(?:.+[\s_.])?[xyz](?:acc|gyro|mag)\d?", name.strip()) is not None
+
+
+def is_of_quaternion(name: str) -> bool:
+    """Tell a column that is called one of the four numbers of a quaternion.
+
+    >>> [is_of_quaternion(name) for name in ("q_w", "quat_x", "Q0()", "imu.qr", "orientation.w", "mag_x", "q", "freq1")]
+    [True, True, True, True, True, False, False, False]
+    """
+    plain = _plain(split_unit(name.strip())[0]).removesuffix("()")
+    return re.fullmatch(r"(?:.*[\s_.\-/])?(?:q|quat\w*|orientation)[\s_.\-\[(]*[wxyzrijk0-3][\])]*", plain) is not None
 
 
 def _split(name: str) -> list[str]:

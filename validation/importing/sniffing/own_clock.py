@@ -35,18 +35,28 @@ class OwnClocks(NamedTuple):
 def own_clocks(clock: Clock, found: Mapping[str, Triple]) -> OwnClocks:
     """Return the clocks of sensors that have a column of time stamps for themselves.
 
-    A column is a sensor's own where its name names the sensor (``mag_time``, ``t_gyro``), or where columns of time of
-    one name stand in front of each sensor's columns. It has to run in the file's unit and over the same span.
+    A column is a sensor's own where its name names the sensor (``mag_time``, ``t_gyro``), where columns of time of one
+    name stand in front of each sensor's columns, or where its file calls the time otherwise. It has to run over the
+    same span, and within a file in that file's unit.
     """
     clocks: dict[str, Clock] = {}
     decisions, notes = [], []
     if clock.column is None:
         return OwnClocks({}, (), ())
+    main = next((t.numbers for t in found.values() if clock.column in t.numbers.table.columns), None)
     for numbers in {id(triple.numbers): triple.numbers for triple in found.values()}.values():
         columns = numbers.table.columns
         others = [one for one in clocks_of(numbers) if one.column not in (None, clock.column)]
         here = {sensor: triple for sensor, triple in found.items() if triple.numbers is numbers}
         if clock.column not in columns:
+            mine, why = _of_other_file(clock, main, numbers)
+            name = numbers.path.name
+            if mine is None:
+                notes.append(f"WARNING: left out: {', '.join(here)} of {name}: {why}")
+                continue
+            clocks |= dict.fromkeys(here, mine)
+            told = f"'{mine.column}' of {name} in {mine.unit}"
+            decisions += [Decision(f"{sensor} time", told, "likely", why) for sensor in here]
             continue
         used = set()
         for sensor, triple in here.items():
@@ -62,6 +72,20 @@ def own_clocks(clock: Clock, found: Mapping[str, Triple]) -> OwnClocks:
             used.add(mine.column)
         notes += _unused(clock, [one for one in others if one.column not in used], numbers)
     return OwnClocks(clocks, tuple(decisions), tuple(notes))
+
+
+def _of_other_file(clock: Clock, main: Numbers | None, numbers: Numbers) -> tuple[Clock | None, str]:
+    """Return the clock of a file without the column of the others' time, and why; none where it runs otherwise."""
+    mine = clocks_of(numbers)[0]
+    if main is None or mine.column is None or mine.decision.sure == "guess" or mine.spacings or mine.scale != 1.0:
+        return (
+            None,
+            f"it has no column '{clock.column}', which is the others' time; name its own like that, in one unit",
+        )
+    first, second = seconds(clock, main), seconds(mine, numbers)
+    if apart := _two_clocks(first, second):
+        return None, f"its time '{mine.column}' {apart.format(clock.column)}"
+    return mine, f"that file has no '{clock.column}', and this runs over the same span"
 
 
 def _mine(sensor: str, triple: Triple, clock: Clock, others: Iterable[Clock]) -> tuple[Clock | None, str]:
@@ -105,13 +129,19 @@ def _unfit(clock: Clock, mine: Clock, numbers: Numbers) -> str:
     """Return why a sensor's own column cannot stand beside the file's; empty where it can."""
     if mine.unit != clock.unit:
         return f"it is in {mine.unit} and '{clock.column}' in {clock.unit}; write both in one unit"
-    first, second = seconds(clock, numbers), seconds(mine, numbers)
+    apart = _two_clocks(seconds(clock, numbers), seconds(mine, numbers))
+    return f"it {apart.format(clock.column)}" if apart else ""
+
+
+def _two_clocks(first: FloatArray, second: FloatArray) -> str:
+    """Return how a second column of time, s, runs apart from a first one whose name is to be put in; empty if not."""
     low, high = np.nanmax([np.nanmin(first), np.nanmin(second)]), np.nanmin([np.nanmax(first), np.nanmax(second)])
-    if high - low < COMMON * (np.nanmax(second) - np.nanmin(second)):
-        return f"it runs from {np.nanmin(second):.6g} to {np.nanmax(second):.6g} s and '{clock.column}' from " + (
-            f"{np.nanmin(first):.6g} to {np.nanmax(first):.6g} s: two clocks"
-        )
-    return ""
+    if high - low >= COMMON * (np.nanmax(second) - np.nanmin(second)):
+        return ""
+    return (
+        f"runs from {np.nanmin(second):.6g} to {np.nanmax(second):.6g} s and '{{}}' from {np.nanmin(first):.6g} to "
+        f"{np.nanmax(first):.6g} s: two clocks"
+    )
 
 
 def _unused(clock: Clock, others: Iterable[Clock], numbers: Numbers) -> list[str]:

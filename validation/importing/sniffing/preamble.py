@@ -12,7 +12,11 @@ __all__ = ["stated_rate", "stated_worths"]
 _NUMBER = r"(\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
 _HERTZ = re.compile(rf"{_NUMBER}\s*_?(k?)Hz(?![A-Za-z])", re.IGNORECASE)
 #: Words before a number of rows a second where the unit is not written.
-_RATE = re.compile(rf"(?:sampl\w*[ _-]*(?:rate|freq\w*)|output[ _-]*rate|\bodr\b)\W{{0,4}}{_NUMBER}", re.IGNORECASE)
+_RATE = re.compile(
+    rf"(?:sampl\w*[ _-]*(?:rate|freq\w*)|(?:output|measurement)[ _-]*rate|\bodr\b)"
+    rf"\W{{0,4}}(?:(k?)Hz\W{{0,4}}(?:[_.]+ *)?)?{_NUMBER}",
+    re.IGNORECASE,
+)
 #: A frequency that stands beside these is another one.
 _OTHER = re.compile(r"baud|filter|cut-?off|bandwidth|\bd?lpf\b|cpu|clock|i2c|spi\b|mains", re.IGNORECASE)
 _COUNT = r"(?:LSB|digit|count|bit)s?"
@@ -25,13 +29,15 @@ def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
 
     >>> stated_rate(["# Device: X, I2C 400 kHz", "# Sampling rate: 200 Hz"])
     (200.0, '# Sampling rate: 200 Hz')
+    >>> stated_rate(["Measurement rate, Hz ___________ 1000"])
+    (1000.0, 'Measurement rate, Hz ___________ 1000')
     """
     found = {}
     for line in lines:
         if _OTHER.search(line):
             continue
         rates = [_value(m[1]) * (1000 if m[2] else 1) for m in _HERTZ.finditer(line)]
-        rates = rates or [_value(m[1]) for m in _RATE.finditer(line)]
+        rates = rates or [_value(m[2]) * (1000 if m[1] else 1) for m in _RATE.finditer(line)]
         found.update({rate: line.strip() for rate in rates if rate > 0})
     return next(iter(found.items())) if len(found) == 1 else None
 

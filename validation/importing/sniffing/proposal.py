@@ -185,7 +185,8 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
     if triple.where is not None:
         lines.append(f"where = {{ {_text(triple.where[0])} = {_text(triple.where[1])} }}")
     if sensor.clock is not None and sensor.clock.column is not None:
-        lines.append(f"time = {_text(sensor.clock.column)} # its own stamps, in the unit of [time]")
+        lines.append(f"time = {_text(sensor.clock.column)} # its own stamps, in the unit of [time] without another")
+        lines += [f"time_unit = {_text(sensor.clock.unit)}"] * (sensor.clock.unit != proposal.clock.unit)
     if sensor.time_offset is not None:
         lines.append(f"time_offset_s = {sensor.time_offset:g} # added to its times")
     lines += [_remark(unit.decision), f"unit = {_text(unit.unit)}"]

@@ -103,21 +103,25 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
-    found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
-    sensors = [triple for triple, _ in found.values() if triple.where is None]
-    clock = with_shared_stamps(clock, [(triple.numbers, triple.values) for triple in sensors])
+    own = _own(clock, found)
+    unclear = own.notes
+    found = {s: found[s] for s in ORDER if s in found and (s in own.clocks or _on(clock, found[s][0].numbers))}
+    sensors = [triple for triple, _ in found.values() if _on(clock, triple.numbers)]
+    read_whole = [(triple.numbers, triple.values) for triple in sensors if triple.where is None]
+    clock = with_shared_stamps(clock, read_whole)
     tables += aside
-    fixed, said = fixes_of(tables, clock, [triple.numbers for triple, _ in found.values()])
+    fixed, said = fixes_of(tables, clock, [triple.numbers for triple in sensors])
     if fixed is not None and any(fixed.numbers is numbers for numbers in aside):
         fixed = fixed._replace(layout=fixed.numbers.dialect.layout)
     if not found and fixed is None:
         raise _nothing(raw, files, failures)
     found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
-    own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
+    own = _own(clock, found)
     place = own_place(tables)
     place = place and place.on(moment_of(clock, files[0].numbers))
-    notes = [*exchanges, *notes, *said, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
+    unclear = (*(note for note in unclear if note not in own.notes), *own.notes)
+    notes = [*exchanges, *notes, *said, *(note for _, note in others), *unclear, *([place.note] if place else [])]
     sniffed = _Sniffed(raw, plant, layout, own, found, notes)
     proposal = _proposal(sniffed, clock, {})
     if offsets := _offsets(proposal, own, found):
@@ -165,7 +169,7 @@ def _file(path: Path, *, alone: bool) -> _File:
     table = read_raw(path, dialect.layout, RepairList(REPAIRS))
     numbers = Numbers(table, dialect, alone)
     clocks = clocks_of(numbers)
-    if clocks[0].column is None and (order := order_of(numbers)) is not None:
+    if (order := order_of(numbers, clocks[0])) is not None:
         layout = replace(dialect.layout, sorted_by=order.column)
         dialect = replace(dialect, layout=layout, remarks=(*dialect.remarks, order.remark))
         table = table.in_order_of(order.column, layout.decimal)
@@ -252,7 +256,7 @@ def _turned_about(
     """Return the sensors, gyroscope and accelerometer exchanged where the field turns as the other one says."""
     if notes or set(ORDER) - set(found):
         return found, notes
-    times = {sensor: seconds(clock, triple.numbers)[triple.rows] for sensor, (triple, _) in found.items()}
+    times = _times(clock, _own(clock, found), found)
     fit = _turned(found, times)
     if fit is None or (fit.ratio < TELLING and _keeps_axis(fit, found["gyroscope"][0])):
         return found, notes
@@ -348,11 +352,18 @@ def _on(clock: Clock, numbers: Numbers) -> bool:
     return set(needed) <= set(numbers.table.columns)
 
 
+def _own(clock: Clock, found: dict[str, tuple[Triple, Decision]]) -> OwnClocks:
+    return own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
+
+
 def _one_clock(tables: Sequence[Numbers]) -> Clock:
-    """Return the best clock that most of the tables have; a map has one."""
-    clocks = [clock for numbers in tables for clock in clocks_of(numbers)]
+    """Return the best clock that most of the tables have, or the first one's where each calls its time otherwise."""
+    of_each = [clocks_of(numbers) for numbers in tables]
+    clocks = [clock for found in of_each for clock in found]
     ranks = {"certain": 0, "likely": 1, "guess": 2}
     shared = [clock for clock in clocks if sum(_on(clock, numbers) for numbers in tables) > len(tables) / 2]
+    if all(clock.column is None for clock in shared) and all(found[0].column is not None for found in of_each):
+        shared = of_each[0]
 
     def order(clock: Clock) -> tuple[bool, float, int]:
         # a column that is one sensor's own stands behind the file's, but for one that is a guess

@@ -1,5 +1,8 @@
 """JSON as a table: records of numbers, one in a line or all in a list, as phones, web pages and brokers write them.
 
+A record is an object, a list of a time and objects (`[0.01, {"a": {"x": 0.1}}]`), or a list of numbers in a list
+(`[[0, 0.1, 9.8], [10, 0.2, 9.7]]`), whose first may be names.
+
 Takes a file; gives a file of comma-separated text, or a folder of them where each sensor has a list of its own. What is
 nested has the names above it before its own (``accel_x``); numbers stay as they are written.
 """
@@ -9,11 +12,14 @@ from __future__ import annotations
 import ast
 import json
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from discsim.errors import InputError, printable
+from discsim.validation.importing.cell_texts import number
+from discsim.validation.importing.sniffing.names import is_time_name, sensor_of
 from discsim.validation.importing.sniffing.other_forms.written import comma_separated, first_bytes, write_named
 
 __all__ = ["begins", "write_tables"]
@@ -22,6 +28,13 @@ __all__ = ["begins", "write_tables"]
 _Record: TypeAlias = Mapping[str, Any]
 
 _BEGINS = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*)?\{\s*[\"']")
+#: A list of lists, and one of those in it; numpy prints no commas.
+_LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*\[[^\[\]{}]*,[^\[\]{}]*\]")
+_LIST = re.compile(r"\[[^\[\]{}]*\]")
+#: A list of a time and an object, at the beginning of a file and in it, and what stands before one more object.
+_TIMED = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*)?\[\s*\"?[^\[\]{},\"]+\"?\s*,\s*\{")
+_TIME = re.compile(r"\[\s*\"?([^\[\]{},\"]+)\"?\s*,\s*(?=\{)")
+_NEXT = re.compile(r"\s*,\s*(?=\{)")
 #: Bytes of a file that is read whole: ten hours of ten channels at 100 rows a second come to half of that.
 MAX_BYTES = 1 << 29
 #: A table of more columns is none of readings: keys that count, as times, make one.
@@ -36,8 +49,9 @@ _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 
 
 def begins(path: Path) -> bool:
-    """Tell a file that begins as an object of JSON, or as a list of such."""
-    return _BEGINS.match(first_bytes(path, 1 << 12)) is not None
+    """Tell a file that begins as an object of JSON, or as a list of such or of lists."""
+    head = first_bytes(path, 1 << 12)
+    return any(form.match(head) is not None for form in (_BEGINS, _LISTS, _TIMED))
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:
@@ -52,7 +66,10 @@ def write_tables(raw: Path, target: Path) -> list[str]:
         raise InputError.at(raw, None, f"cannot be read ({error.strerror}); expected what a logger wrote") from None
     if size > MAX_BYTES:
         raise InputError.at(raw, None, f"is JSON of {size >> 20} MB; expected at most {MAX_BYTES >> 20} MB, or CSV")
-    objects, broken = _objects(text)
+    head = first_bytes(raw, 1 << 12)
+    if _LISTS.match(head) is not None:
+        return _write_lists(raw, target, text)
+    objects, broken = _timed(text) if _TIMED.match(head) is not None else _objects(text)
     tables = {name: rows for name, rows in _tables(objects).items() if len(rows) >= FEWEST}
     if not tables:
         raise InputError.at(
@@ -66,6 +83,44 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     said = [f"{raw.name}: JSON, read as a table of its records: {counted}"]
     pieces = "1 piece that is no JSON is" if broken == 1 else f"{broken} pieces that are no JSON are"
     return said + [f"{raw.name}: {pieces} LEFT OUT"] * (broken > 0)
+
+
+def _write_lists(raw: Path, target: Path, text: str) -> list[str]:
+    """Write the lists in a list as rows of a table, those of the usual length, and return what to say of them."""
+    rows = []
+    for found in _LIST.finditer(text):
+        try:
+            rows.append(_DECODER.decode(found[0]))
+        except ValueError:
+            rows.append([])
+    usual = Counter(map(len, rows)).most_common(1)[0][0]
+    kept = [["" if cell is None else str(cell) for cell in row] for row in rows if len(row) == usual]
+    if len(kept) < FEWEST or usual < 2:
+        raise InputError.at(raw, None, "is JSON of lists without rows of numbers; expected a list for each reading")
+    target.write_text(comma_separated(kept), encoding="utf-8")
+    said = [f"{raw.name}: JSON, read as a table of its lists: {len(kept)} of {usual}"]
+    lost = len(rows) - len(kept)
+    return said + [f"{raw.name}: {lost} of another length LEFT OUT"] * (lost > 0)
+
+
+def _timed(text: str) -> tuple[list[_Record], int]:
+    """Return the objects of each list that begins with a time, joined, with that time; and how many broke off."""
+    found: list[_Record] = []
+    broken, at = 0, 0
+    while (begun := _TIME.search(text, at)) is not None:
+        record: dict[str, Any] = {"t": begun[1]}
+        at = begun.end()
+        try:
+            one, at = _DECODER.raw_decode(text, at)
+            record |= one
+            while (more := _NEXT.match(text, at)) is not None:
+                one, at = _DECODER.raw_decode(text, more.end())
+                record |= one
+        except (ValueError, RecursionError):
+            broken += 1
+            continue
+        found.append(record)
+    return found, broken
 
 
 def _objects(text: str) -> tuple[list[_Record], int]:
@@ -103,7 +158,7 @@ def _tables(objects: Sequence[_Record]) -> dict[str, list[_Record]]:
     if any(len(rows) >= FEWEST for rows in inner.values()):
         return inner
     if len(objects) == 1 and (columns := _columns(objects[0])):
-        return {"": columns}
+        return columns
     return {"": list(objects)}
 
 
@@ -116,28 +171,61 @@ def _lists(value: Any, name: str = "") -> Iterator[tuple[str, list[_Record]]]:
         yield name, value
 
 
-def _columns(one: _Record) -> list[_Record]:
-    """Return the records of an object that holds a list for each column, or rows under the names of their columns."""
-    names, rows = one.get("columns"), one.get("data")
-    if isinstance(names, list) and isinstance(rows, list) and all(isinstance(row, list) for row in rows):
-        return [dict(zip(map(str, names), row, strict=False)) for row in rows]
+def _columns(one: _Record) -> dict[str, list[_Record]]:
+    """Return the records of an object that holds a list for each column, or rows under the names of their columns.
+
+    Where lists are not of one length, each sensor has its own rate: what stands under one name is a table of its own.
+    """
     lists = dict(_lists_of_numbers(one))
-    if not lists:
-        return []
-    longest = max(map(len, lists.values()))
-    even = {name: column for name, column in lists.items() if len(column) == longest}
-    return [dict(zip(even, row, strict=True)) for row in zip(*even.values(), strict=True)]
+    for rows in filter(_is_table, lists.values()):
+        named = (names for names in lists.values() if _is_names(names, len(rows[0])))
+        if (names := next(named, None)) is not None:
+            return {"": [dict(zip(names, row, strict=False)) for row in rows]}
+    if len({*map(len, lists.values())}) < 2:
+        return {"": _records({"_".join(path): column for path, column in lists.items()})} if lists else {}
+    times = {path[0]: column for path, column in lists.items() if len(path) == 1 and is_time_name(path[0])}
+    tables: dict[str, dict[str, list[Any]]] = {}
+    for path, column in lists.items():
+        if path[0] not in times:
+            above, columns = (path, _axes(column)) if _is_table(column) else (path[:-1], {path[-1]: column})
+            tables.setdefault("_".join(above) or f"columns_{len(column)}", {}).update(columns)
+    for table in tables.values():
+        length = len(next(iter(table.values())))
+        table.update({name: column for name, column in times.items() if len(column) == length})
+    return {name: _records(table) for name, table in tables.items()}
 
 
-def _lists_of_numbers(value: _Record, name: str = "") -> Iterator[tuple[str, list[Any]]]:
+def _records(columns: Mapping[str, list[Any]]) -> list[_Record]:
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=False)]
+
+
+def _axes(rows: list[list[Any]]) -> dict[str, list[Any]]:
+    """Return a sensor's rows as columns: of three numbers x, y and z, of four the time before them."""
+    names = {3: _AXES, 4: f"t{_AXES}"}.get(len(rows[0]), map(str, range(len(rows[0]))))
+    return dict(zip(names, map(list, zip(*rows, strict=False)), strict=False))
+
+
+def _is_table(value: Any) -> bool:
+    """Tell a list of records that are lists."""
+    return isinstance(value, list) and bool(value) and all(isinstance(row, list) for row in value)
+
+
+def _is_names(value: Any, width: int) -> bool:
+    """Tell a list of names for so many columns: numbers stand as text, too, as long as a file is read."""
+    named = isinstance(value, list) and len(value) == width and all(isinstance(name, str) for name in value)
+    return named and sum(number(name) is None for name in value) > width / 2
+
+
+def _lists_of_numbers(value: _Record, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], list[Any]]]:
+    """Yield the lists in an object, with the keys above each."""
     for key, part in value.items():
-        full = f"{name}_{key}" if name else str(key)
+        path = (*above, str(key))
         if isinstance(part, Mapping) and len(part) >= _ROWS and all(str(row).isdecimal() for row in part):
-            yield full, list(part.values())
+            yield path, list(part.values())
         elif isinstance(part, Mapping):
-            yield from _lists_of_numbers(part, full)
+            yield from _lists_of_numbers(part, path)
         elif isinstance(part, list) and len(part) >= FEWEST:
-            yield full, part
+            yield path, part
 
 
 def _text(raw: Path, records: Sequence[_Record]) -> str:
@@ -150,16 +238,19 @@ def _text(raw: Path, records: Sequence[_Record]) -> str:
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
-    """Yield the cells of a record with their names; three numbers in a list are x, y and z.
+    """Yield the cells of a record with their names; three numbers in a list are x, y and z, four of a sensor t as well.
 
     >>> dict(_flat({"t": "5", "gyro": {"x": "1"}, "acc": ["1", "2", "3"], "ok": True, "note": None}))
     {'t': '5', 'gyro_x': '1', 'acc_x': '1', 'acc_y': '2', 'acc_z': '3', 'ok': '1', 'note': ''}
+    >>> [name for name, _ in _flat({"mag": [0, 1, 2, 3], "q": [1, 0, 0, 0]})]
+    ['mag_t', 'mag_x', 'mag_y', 'mag_z', 'q_0', 'q_1', 'q_2', 'q_3']
     """
     parts: Iterable[tuple[Any, Any]]
     if isinstance(value, Mapping):
         parts = value.items()
     elif isinstance(value, list | tuple):
-        parts = zip(_AXES if len(value) == len(_AXES) else range(len(value)), value, strict=True)
+        own = {3: _AXES, 4: f"t{_AXES}" if sensor_of(name) is not None else range(4)}
+        parts = zip(own.get(len(value), range(len(value))), value, strict=True)
     else:
         text = "" if value is None else str(int(value)) if isinstance(value, bool) else str(value)
         yield name, " ".join(text.split())
