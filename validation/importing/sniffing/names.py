@@ -64,8 +64,7 @@ _RANGES = ("high", "low")
 #: A column that stands this far back is no sensor's reading.
 NO_READING = 9
 #: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration
-#: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back; what a
-#: program converted goes before the counts beside it.
+#: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
 _STAND_BACK = {
     NO_READING: (
         "lin linear user fe fl ned enu earth world ohne without sans senza gravity err error bias offset setpoint "
@@ -74,8 +73,9 @@ _STAND_BACK = {
     ),
     2: "uncal uncalibrated unfilt debug 2 second motion",
     1: "filt filtered lpf",
-    -1: "real si scaled converted",
 }
+#: Words of what a program converted: it goes before the counts beside it.
+_CONVERTED = {"real", "si", "scaled", "converted"}
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
 _AS_READ = re.compile(r"\bang(?:ular)?[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
 _LINEAR = {"lin", "linear"}
@@ -197,7 +197,7 @@ def is_of_quaternion(name: str) -> bool:
     [True, True, True, True, True, False, False, False]
     """
     plain = _plain(split_unit(name.strip())[0]).removesuffix("()")
-    return re.fullmatch(r"(?:.*[\s_.\-/])?(?:q|quat\w*|orientation)[\s_.\-\[(]*[wxyzrijk0-3][\])]*", plain) is not None
+    return re.fullmatch(r"(?:.*[\s_.\-/])?(?:q|quat\w*|orientation)[\s_.\-\[(]*[wxyzrijk0-4][\])]*", plain) is not None
 
 
 def _split(name: str) -> list[str]:
@@ -215,9 +215,14 @@ def sensor_of(base: str) -> str | None:
 
 
 def penalty_of(base: str) -> int:
-    """Return how far a column stands back behind the plain sensor's: words of what was worked out from it."""
+    """Return how far a column stands back behind the plain sensor's: words of what was worked out from it.
+
+    >>> penalty_of("lin_acc"), penalty_of("acc"), penalty_of("acc_real"), penalty_of("lin_acc_real")
+    (9, 0, -1, 9)
+    """
     words = _words_beside(base)
-    return sum(weight for weight, listed in _STAND_BACK.items() for word in listed.split() if word in words)
+    back = sum(weight for weight, listed in _STAND_BACK.items() for word in listed.split() if word in words)
+    return back if back or words.isdisjoint(_CONVERTED) else -1
 
 
 def _words_beside(base: str) -> set[str]:

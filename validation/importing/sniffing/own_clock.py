@@ -14,7 +14,7 @@ from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
 from discsim.validation.importing.sniffing.names import sensor_of, timeless
 
-__all__ = ["OwnClocks", "own_clocks"]
+__all__ = ["OwnClocks", "clocks_of_files", "own_clocks"]
 
 #: Two columns of time are one clock's where they stay together, but for a constant, within a row of the coarser.
 APART = 1.0
@@ -31,32 +31,26 @@ class OwnClocks(NamedTuple):
     decisions: tuple[Decision, ...]
     notes: tuple[str, ...]
 
+    def beside(self, other: OwnClocks) -> OwnClocks:
+        """Return both."""
+        return OwnClocks({**self.clocks, **other.clocks}, self.decisions + other.decisions, self.notes + other.notes)
+
 
 def own_clocks(clock: Clock, found: Mapping[str, Triple]) -> OwnClocks:
     """Return the clocks of sensors that have a column of time stamps for themselves.
 
-    A column is a sensor's own where its name names the sensor (``mag_time``, ``t_gyro``), where columns of time of one
-    name stand in front of each sensor's columns, or where its file calls the time otherwise. It has to run over the
-    same span, and within a file in that file's unit.
+    A column is a sensor's own where its name names the sensor (``mag_time``, ``t_gyro``), or where columns of time of
+    one name stand in front of each sensor's columns. It has to run in the file's unit and over the same span.
     """
     clocks: dict[str, Clock] = {}
     decisions, notes = [], []
     if clock.column is None:
         return OwnClocks({}, (), ())
-    main = next((t.numbers for t in found.values() if clock.column in t.numbers.table.columns), None)
     for numbers in {id(triple.numbers): triple.numbers for triple in found.values()}.values():
         columns = numbers.table.columns
         others = [one for one in clocks_of(numbers) if one.column not in (None, clock.column)]
         here = {sensor: triple for sensor, triple in found.items() if triple.numbers is numbers}
         if clock.column not in columns:
-            mine, why = _of_other_file(clock, main, numbers)
-            name = numbers.path.name
-            if mine is None:
-                notes.append(f"WARNING: left out: {', '.join(here)} of {name}: {why}")
-                continue
-            clocks |= dict.fromkeys(here, mine)
-            told = f"'{mine.column}' of {name} in {mine.unit}"
-            decisions += [Decision(f"{sensor} time", told, "likely", why) for sensor in here]
             continue
         used = set()
         for sensor, triple in here.items():
@@ -74,18 +68,32 @@ def own_clocks(clock: Clock, found: Mapping[str, Triple]) -> OwnClocks:
     return OwnClocks(clocks, tuple(decisions), tuple(notes))
 
 
-def _of_other_file(clock: Clock, main: Numbers | None, numbers: Numbers) -> tuple[Clock | None, str]:
-    """Return the clock of a file without the column of the others' time, and why; none where it runs otherwise."""
-    mine = clocks_of(numbers)[0]
-    if main is None or mine.column is None or mine.decision.sure == "guess" or mine.spacings or mine.scale != 1.0:
-        return (
-            None,
-            f"it has no column '{clock.column}', which is the others' time; name its own like that, in one unit",
-        )
-    first, second = seconds(clock, main), seconds(mine, numbers)
-    if apart := _two_clocks(first, second):
-        return None, f"its time '{mine.column}' {apart.format(clock.column)}"
-    return mine, f"that file has no '{clock.column}', and this runs over the same span"
+def clocks_of_files(clock: Clock, found: Mapping[str, Triple]) -> OwnClocks:
+    """Return the clocks of sensors whose file calls its time otherwise than the others, in any unit.
+
+    It has to run over the same span as the others' column; a sensor of which it does not is to be left out.
+    """
+    clocks: dict[str, Clock] = {}
+    decisions, notes = [], []
+    main = next((t.numbers for t in found.values() if clock.column in t.numbers.table.columns), None)
+    for sensor, triple in found.items():
+        numbers = triple.numbers
+        if clock.column is None or clock.column in numbers.table.columns:
+            continue
+        mine = clocks_of(numbers)[0]
+        plain = mine.decision.sure != "guess" and not mine.spacings and mine.scale == 1.0
+        if main is None or mine.column is None or not plain:
+            why = f"it has no column '{clock.column}', the others' time; name its own like that, in one unit"
+        elif apart := _two_clocks(seconds(clock, main), seconds(mine, numbers)):
+            why = f"its time '{mine.column}' {apart.format(clock.column)}"
+        else:
+            clocks[sensor] = mine
+            why = f"that file has no '{clock.column}', and this runs over the same span"
+            told = f"'{mine.column}' of {numbers.path.name} in {mine.unit}"
+            decisions.append(Decision(f"{sensor} time", told, "likely", why))
+            continue
+        notes.append(f"WARNING: left out: {sensor} of {numbers.path.name}: {why}")
+    return OwnClocks(clocks, tuple(decisions), tuple(notes))
 
 
 def _mine(sensor: str, triple: Triple, clock: Clock, others: Iterable[Clock]) -> tuple[Clock | None, str]:

@@ -42,7 +42,7 @@ from discsim.validation.importing.sniffing.magnitudes import (
     magnetometer_unit,
 )
 from discsim.validation.importing.sniffing.names import NO_READING, is_time_name, sensor_of, timeless
-from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
+from discsim.validation.importing.sniffing.own_clock import OwnClocks, clocks_of_files, own_clocks
 from discsim.validation.importing.sniffing.own_place import own_place
 from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
@@ -103,9 +103,8 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
-    own = _own(clock, found)
-    unclear = own.notes
-    found = {s: found[s] for s in ORDER if s in found and (s in own.clocks or _on(clock, found[s][0].numbers))}
+    apart = clocks_of_files(clock, _triples(found))
+    found = {s: found[s] for s in ORDER if s in found and (s in apart.clocks or _on(clock, found[s][0].numbers))}
     sensors = [triple for triple, _ in found.values() if _on(clock, triple.numbers)]
     read_whole = [(triple.numbers, triple.values) for triple in sensors if triple.where is None]
     clock = with_shared_stamps(clock, read_whole)
@@ -117,11 +116,11 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
         raise _nothing(raw, files, failures)
     found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
-    own = _own(clock, found)
+    own = clocks_of_files(clock, _triples(found)).beside(own_clocks(clock, _triples(found)))
     place = own_place(tables)
     place = place and place.on(moment_of(clock, files[0].numbers))
-    unclear = (*(note for note in unclear if note not in own.notes), *own.notes)
-    notes = [*exchanges, *notes, *said, *(note for _, note in others), *unclear, *([place.note] if place else [])]
+    notes += [*said, *(note for _, note in others), *apart.notes, *own.notes, *([place.note] if place else [])]
+    notes = [*exchanges, *notes]
     sniffed = _Sniffed(raw, plant, layout, own, found, notes)
     proposal = _proposal(sniffed, clock, {})
     if offsets := _offsets(proposal, own, found):
@@ -256,7 +255,7 @@ def _turned_about(
     """Return the sensors, gyroscope and accelerometer exchanged where the field turns as the other one says."""
     if notes or set(ORDER) - set(found):
         return found, notes
-    times = _times(clock, _own(clock, found), found)
+    times = _times(clock, clocks_of_files(clock, _triples(found)), found)
     fit = _turned(found, times)
     if fit is None or (fit.ratio < TELLING and _keeps_axis(fit, found["gyroscope"][0])):
         return found, notes
@@ -352,8 +351,8 @@ def _on(clock: Clock, numbers: Numbers) -> bool:
     return set(needed) <= set(numbers.table.columns)
 
 
-def _own(clock: Clock, found: dict[str, tuple[Triple, Decision]]) -> OwnClocks:
-    return own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
+def _triples(found: dict[str, tuple[Triple, Decision]]) -> dict[str, Triple]:
+    return {sensor: triple for sensor, (triple, _) in found.items()}
 
 
 def _one_clock(tables: Sequence[Numbers]) -> Clock:
@@ -417,7 +416,7 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
     times = _times(clock, own, found)
     times |= {sensor: times[sensor] + offset for sensor, (offset, _) in offsets.items()}
     fit = _turned(found, times)
-    turns = seen_turns({sensor: triple for sensor, (triple, _) in found.items()}, times, fit)
+    turns = seen_turns(_triples(found), times, fit)
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
         sound = np.isfinite(triple.values).all(axis=1)
@@ -442,8 +441,7 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
         peak = float(np.nanmax(np.abs(found["gyroscope"][0].values)))
         units = {**units, "gyroscope": doubted(units["gyroscope"], peak, pull)}
     if "gyroscope" in found and not own.clocks:
-        triples = {sensor: triple for sensor, (triple, _) in found.items()}
-        ticks = ticking(clock, units["gyroscope"], turns, pull, triples, times)
+        ticks = ticking(clock, units["gyroscope"], turns, pull, _triples(found), times)
         if ticks is not None:
             return _proposal(sniffed, ticks, offsets)
     notes = [*_on_time(clock, found, times, units, turns, pull), *sniffed.notes]
