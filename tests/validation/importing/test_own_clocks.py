@@ -179,4 +179,4 @@ def test_a_file_without_stamps_beside_others_with_them_is_left_out_aloud(tmp_pat
     np.savetxt(place / "mag.csv", made_log().mag, delimiter=",", fmt="%.3f", header="x,y,z", comments="")
     recording, said = imported(place)
     assert {*recording.samples} == {"gyroscope", "accelerometer"}
-    assert "WARNING: left out: magnetometer of mag.csv: it has no column 'time_ms', which is the others' time" in said
+    assert "WARNING: left out: magnetometer of mag.csv: it has no column 'time_ms', the others' time" in said
