@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.sensors import Lag
+from discsim.effects.sensors import CrossAxis, Lag
 from discsim.validation.diagnosis.first_trajectory import beginning, time_ratio
 from discsim.validation.diagnosis.selection.begun_anew import begun_anew
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
@@ -34,6 +34,9 @@ from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import CLOCKS
 
 __all__ = ["ContinuousFit", "continuous_fit", "standard_errors", "wider_with"]
+
+#: the numbers of a cross-axis error that a turn has opposite
+_PAIRS = (("sxy", "syx"), ("sxz", "szx"), ("syz", "szy"))
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,20 @@ class ContinuousFit:
             for q, variance in zip(self.fit.parameters, np.diag(self.fit.covariance), strict=True)
         )
         return max(count - untold, 1)
+
+    def told_beyond_a_turn(self, cross: CandidateEffect) -> int:
+        """Return how many of a cross-axis error's numbers the readings tell that no turn has, 0 to 3: sums of pairs.
+
+        What they could be beforehand is what all six are in the root of their mean square: the numbers of one part are
+        of one size. Where readings leave more than half of that variance, six numbers are as likely as three.
+        """
+        place = {q.name: k for k, q in enumerate(self.fit.parameters) if q.group == cross.id}
+        if self.fit.covariance.shape[0] != len(self.fit.parameters) or set(CrossAxis._fields) - set(place):
+            return len(_PAIRS)
+        size2 = float(np.mean([self.fit.at[place[name]] ** 2 for name in CrossAxis._fields]))
+        pairs = [[place[one], place[other]] for one, other in _PAIRS]
+        left = [0.5 * float(np.sum(self.fit.covariance[np.ix_(pair, pair)])) for pair in pairs]
+        return sum(variance < 0.5 * size2 for variance in left)
 
     def worse_than(self, other: ContinuousFit) -> float:
         """Return by how much its score is higher than another's, on the readings that take part in both.

@@ -6,7 +6,7 @@ number of candidates and instants that were tried).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from discsim.effects.setup import TimeOffset
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.settings import SELECTION
 
-__all__ = ["charge", "lead", "price", "price_of_oddity"]
+__all__ = ["charge", "holds_itself", "lead", "price", "price_of_oddity"]
 
 #: within which parameters make sense, the effects' and a rig's own
 BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
@@ -36,6 +36,18 @@ ONE_SIDED: Mapping[tuple[str, str], float] = {
 TURNED = frozenset(row.id for row in MOUNTS if row.acts_on != "accelerometer")
 
 
+#: a turned sensor -> the cross-axis error that holds it: a small turn is one whose numbers are opposite in pairs
+_HOLDS: Mapping[str, str] = {
+    turned.id: cross.id
+    for turned in MOUNTS
+    for cross in CATALOGUE.values()
+    if cross.type is CrossAxis and cross.acts_on == turned.acts_on
+}
+#: those of which a fit of all effects at once weighs both, and those that stand one in the place of the other
+NESTED: Mapping[str, str] = {turned: cross for turned, cross in _HOLDS.items() if turned in TURNED}
+IN_PLACE: Mapping[str, str] = {turned: cross for turned, cross in _HOLDS.items() if turned not in TURNED}
+
+
 #: times that are off by as much all along: a part that is late has a filter, mostly
 MISTIMED = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOffset)
 
@@ -47,17 +59,9 @@ def charge(candidate: CandidateEffect, told: int | None = None) -> float:
     """
     # a turn about the axis of spin stands in for an offset, too: it stays as far behind that as behind anything else
     unusual = SELECTION.mistimed if candidate.id in MISTIMED | TURNED else 0.0
-    unusual += SELECTION.turned if candidate.id in TURNED else 0.0
+    # an accelerometer shares its chip with the gyroscope: it alone is turned as seldom as either
+    unusual += SELECTION.turned if candidate.id in _HOLDS else 0.0
     return SELECTION.rival * (len(parameters_of(candidate)) if told is None else told) + unusual
-
-
-#: a turned sensor -> the cross-axis error that holds it: a small turn is one whose numbers are opposite in pairs
-NESTED: Mapping[str, str] = {
-    turned.id: cross.id
-    for turned in MOUNTS
-    for cross in CATALOGUE.values()
-    if turned.id in TURNED and cross.type is CrossAxis and cross.acts_on == turned.acts_on
-}
 
 
 def lead(
@@ -71,6 +75,15 @@ def lead(
     if NESTED.get(rival.id) == candidate.id:
         return SELECTION.rival * (len(parameters_of(rival)) - len(parameters_of(candidate)))
     return charge(rival, rival_told) - charge(candidate, told)
+
+
+def holds_itself(candidates: Iterable[CandidateEffect]) -> bool:
+    """Tell a turned sensor beside the cross-axis error that holds it: of the two together only squares of angles count.
+
+    Large ones that cancel each other are a scale then, of a sensor that nobody built so.
+    """
+    ids = {candidate.id for candidate in candidates}
+    return any(turned in ids and cross in ids for turned, cross in IN_PLACE.items())
 
 
 def price(candidate: CandidateEffect) -> float:

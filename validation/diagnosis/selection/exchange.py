@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import lead, price
+from discsim.validation.diagnosis.selection.evidence import IN_PLACE, lead, price
 from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
@@ -198,8 +198,19 @@ def _merit(worse: float, rival: Rival, candidate: CandidateEffect, final: Contin
 
     Each is charged for what readings tell of it, and for how unlikely the sizes are that all effects have beside it.
     """
-    charges = lead(rival.candidate, candidate, rival.fitted.told(rival.candidate), final.told(candidate))
-    return worse + charges + rival.fitted.prior_penalty - final.prior_penalty
+    return worse + _charges(rival, candidate, final) + rival.fitted.prior_penalty - final.prior_penalty
+
+
+def _charges(rival: Rival, candidate: CandidateEffect, final: ContinuousFit) -> float:
+    """Return by how much more a rival is charged than an effect.
+
+    Of a turn and the matrix that holds it the turn is the simpler one by as many numbers as readings tell beside it.
+    """
+    if IN_PLACE.get(rival.candidate.id) == candidate.id:
+        return -SELECTION.rival * final.told_beyond_a_turn(candidate)
+    if IN_PLACE.get(candidate.id) == rival.candidate.id:
+        return SELECTION.rival * rival.fitted.told_beyond_a_turn(rival.candidate)
+    return lead(rival.candidate, candidate, rival.fitted.told(rival.candidate), final.told(candidate))
 
 
 def takes_its_place(worse: float, rival: Rival, candidate: CandidateEffect, final: ContinuousFit) -> bool:

@@ -13,7 +13,7 @@ from discsim.recording import Recording
 from discsim.validation.diagnosis.detectors.dropped_samples import LostSamples
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
-from discsim.validation.diagnosis.selection.evidence import ONE_SIDED
+from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, holds_itself
 from discsim.validation.diagnosis.selection.hypothesis import Start
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
@@ -197,8 +197,11 @@ def _radius(recording: Recording) -> float:
 def possible(fitted: ContinuousFit) -> bool:
     """Tell whether a fit's parameters make sense.
 
-    Friction does not drive, an event is told from the start, neither a sensor nor the centre of mass lies off the disc.
+    Friction does not drive, an event is told from the start, neither a sensor nor the centre of mass lies off the disc,
+    and no effect holds another.
     """
+    if holds_itself(fitted.hypothesis.candidates):
+        return False
     sd = np.sqrt(np.maximum(np.diag(fitted.fit.covariance), 0.0))
     recording = fitted.fit.trajectories[0].recording
     radius = _radius(recording)

@@ -182,6 +182,13 @@ def test_a_sensor_far_off_the_disc_is_impossible():
     assert not possible(with_offset(0.2))
 
 
+def test_a_turned_accelerometer_beside_the_cross_axis_error_that_holds_it_is_impossible():
+    found = windy()
+    for ids, sensible in ((("accel.mount", "accel.scale"), True), (("accel.cross_axis", "accel.mount"), False)):
+        hypothesis = Hypothesis(tuple(map(of, ids)))
+        assert possible(replace(found.final, hypothesis=hypothesis)) is sensible
+
+
 def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():
     big, small = of("air.wind"), of("aero.stall")
     there = [
