@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -42,6 +43,7 @@ def test_an_error_ends_the_work_that_has_not_begun():
     def failing(piece: int) -> None:
         if piece == 0:
             raise ValueError("the first")
+        time.sleep(0.001)  # a piece of work: of ones that last no time a busy machine ends all before the error is seen
         done.append(piece)
 
     with pytest.raises(ValueError, match="the first"):
