@@ -97,3 +97,13 @@ def test_wild_stamps_of_a_log_that_stands_in_order_move_no_row(tmp_path):
     assert "out of order" not in log.summary().partition("WARNING")[0]
     kept = log.recordings[0].samples["gyroscope"]
     assert_allclose(kept.value[:, 2], np.interp(kept.t, LOG.t, LOG.gyro[:, 2]), atol=1e-6)
+
+
+@pytest.mark.parametrize(("late", "begun"), [(0.0012, 0.0), (0.0025, 0.0), (0.0041, 0.0), (0.013, 48.2), (0.013, 3.0)])
+def test_a_clock_that_began_anew_is_no_other_order(tmp_path, late, begun):
+    """Its second stretch lies between the rows of the first, before it, or partly either."""
+    half = SIZE // 2
+    stamps = [f"{begun + LOG.t[k] if k < half else LOG.t[k] - LOG.t[half] + late:.4f}" for k in range(SIZE)]
+    log = import_log(written(tmp_path / "log.csv", np.arange(SIZE), stamps))
+    assert "out of order" not in log.summary()
+    assert "the clock starts anew" in log.summary()

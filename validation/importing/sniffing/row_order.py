@@ -23,6 +23,8 @@ BACK = 0.99
 #: Share of steps within half of the usual one, once rows are in order, by which these are one log's. Stamps of a
 #: counter that begins anew lie between one another then: the steps of such are as those of chance, and 35 % within.
 EVEN = 0.9
+#: Two stretches of one log that lie in one another have steps of half the length, or less.
+SHORTER = 0.75
 #: Rows of which an order is asked, at least.
 FEWEST = 20
 
@@ -61,7 +63,8 @@ def _by(column: str, told: str) -> RowOrder:
 def _told(value: FloatArray, *, fills: bool) -> str | None:
     """Return how times (n,) stand that belong in another order; None where their order is another matter.
 
-    ``fills``: once in order fewer steps are uneven than went back. A wild stamp leaves a gap and parts a step in two.
+    ``fills``: once in order fewer steps are uneven than went back, and they are as long as they were. A wild stamp
+    leaves a gap and parts a step in two; a clock that began anew parts them all.
     """
     steps = np.diff(value)
     if value.size < FEWEST or not np.any(steps < 0.0):
@@ -70,7 +73,11 @@ def _told(value: FloatArray, *, fills: bool) -> str | None:
         return "run BACKWARDS, the newest first"
     ordered = np.diff(np.sort(value))
     usual = float(np.median(ordered))
-    even = float(np.mean(np.abs(ordered - usual) < 0.5 * usual)) if usual > 0.0 else 0.0
-    if even < EVEN or (fills and 1.0 - even > np.mean(steps < 0.0)):
+    if usual <= 0.0:
+        return None
+    uneven = np.count_nonzero(np.abs(ordered - usual) >= 0.5 * usual)
+    if uneven > (1.0 - EVEN) * ordered.size or (fills and uneven >= np.count_nonzero(steps < 0.0)):
+        return None
+    if fills and usual < SHORTER * float(np.median(steps[steps > 0.0])):
         return None
     return f"stand out of order ({100.0 * np.mean(steps < 0.0):.2g} % of them are earlier than the one above)"
