@@ -187,7 +187,7 @@ def _columns(one: _Record) -> dict[str, list[_Record]]:
     tables: dict[str, dict[str, list[Any]]] = {}
     for path, column in lists.items():
         if path[0] not in times:
-            above, columns = (path, _axes(column)) if _is_table(column) else (path[:-1], {path[-1]: column})
+            above, columns = (path, _axes(path[-1], column)) if _is_table(column) else (path[:-1], {path[-1]: column})
             tables.setdefault("_".join(above) or f"columns_{len(column)}", {}).update(columns)
     for table in tables.values():
         length = len(next(iter(table.values())))
@@ -199,10 +199,17 @@ def _records(columns: Mapping[str, list[Any]]) -> list[_Record]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=False)]
 
 
-def _axes(rows: list[list[Any]]) -> dict[str, list[Any]]:
-    """Return a sensor's rows as columns: of three numbers x, y and z, of four the time before them."""
-    names = {3: _AXES, 4: f"t{_AXES}"}.get(len(rows[0]), map(str, range(len(rows[0]))))
-    return dict(zip(names, map(list, zip(*rows, strict=False)), strict=False))
+def _axes(name: str, rows: list[list[Any]]) -> dict[str, list[Any]]:
+    """Return the rows that stand under a name as columns."""
+    return dict(zip(_places(name, len(rows[0])), map(list, zip(*rows, strict=False)), strict=False))
+
+
+def _places(name: str, size: int) -> Sequence[str]:
+    """Return what the numbers in a list are called: three are x, y and z, four of a sensor have the time in front."""
+    if size == len(_AXES):
+        return _AXES
+    timed = size == len(_AXES) + 1 and sensor_of(name) is not None
+    return f"t{_AXES}" if timed else [str(place) for place in range(size)]
 
 
 def _is_table(value: Any) -> bool:
@@ -249,8 +256,7 @@ def _flat(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
     if isinstance(value, Mapping):
         parts = value.items()
     elif isinstance(value, list | tuple):
-        own = {3: _AXES, 4: f"t{_AXES}" if sensor_of(name) is not None else range(4)}
-        parts = zip(own.get(len(value), range(len(value))), value, strict=True)
+        parts = zip(_places(name, len(value)), value, strict=True)
     else:
         text = "" if value is None else str(int(value)) if isinstance(value, bool) else str(value)
         yield name, " ".join(text.split())
