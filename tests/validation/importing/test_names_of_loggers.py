@@ -159,3 +159,37 @@ def test_where_a_row_stands_in_a_memory_is_no_time_of_it(tmp_path):
     rows = np.column_stack([place, (4.1 * LOG.t * 1000).round(), LOG.gyro / DEG / 4.1, LOG.accel / G0])
     np.savetxt(tmp_path / "log.csv", rows, delimiter=",", fmt=["%d", "%d", *["%.4f"] * 6])
     assert import_log(tmp_path / "log.csv").recordings[0].samples["gyroscope"].t[-1] > 35.0
+
+
+def test_columns_whose_capitals_differ_are_one_sensor_s(tmp_path):
+    """As in "Timestamp;Index;AccelX;AccelY;AccelZ;gyroX;GyroY;GyroZ": there was no gyroscope."""
+    columns = [("time_us", 1e6 * LOG.t), *three(["AccelX", "AccelY", "AccelZ"], LOG.accel)]
+    columns += three(["gyroX", "GyroY", "GyroZ"], LOG.gyro)
+    log = import_log(write_table(tmp_path / "log.csv", columns))
+    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-5)
+    columns += three(["GyroX", "gyroY", "gyroZ"], 0 * LOG.gyro)
+    log = import_log(write_table(tmp_path / "two.csv", columns))  # GyroX, GyroY, GyroZ and gyroX, gyroY, gyroZ
+    names = {decision.choice for decision in log.decisions if decision.what == "gyroscope"}
+    assert names <= {"gyroX, gyroY, gyroZ", "GyroX, GyroY, GyroZ"}
+
+
+def test_a_unit_may_be_parted_by_its_capital_alone_and_an_angular_acceleration_is_no_accelerometer_s(tmp_path):
+    """It was taken for one, without gravity, and rows as 0.01 s apart."""
+    columns = [*three([f"gyro{axis}Dps" for axis in "XYZ"], LOG.gyro / DEG)]
+    columns += three([f"angAcc{axis}" for axis in "XYZ"], np.random.default_rng(3).normal(0, 20, (LOG.t.size, 3)))
+    columns += [*three([f"linAcc{axis}" for axis in "XYZ"], LOG.accel - LOG.accel[0]), ("tsMs", 1e3 * LOG.t)]
+    log = import_log(write_table(tmp_path / "log.csv", columns))
+    samples = log.recordings[0].samples
+    assert list(samples) == ["gyroscope"]
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+    (unit,) = [decision for decision in log.decisions if decision.what == "gyroscope unit"]
+    assert (unit.choice, unit.sure) == ("deg/s", "certain")
+
+
+@pytest.mark.parametrize(("name", "unit"), [("gyro_z", '"rad/s" or "deg/s"'), ("gyro_z_dps", '"deg/s"')])
+def test_a_gyroscope_of_one_axis_beside_other_sensors_is_said_with_the_lines_of_a_map(tmp_path, name, unit):
+    columns = [("time_us", 1e6 * LOG.t), *three(["ax", "ay", "az"], LOG.accel), *three(["mx", "my", "mz"], LOG.mag)]
+    log = import_log(write_table(tmp_path / "log.csv", [*columns, (name, LOG.gyro[:, 2])]))
+    line = f'[sensors.rate_reference] columns = ["{name}"], unit = {unit} (scale'
+    assert [note for note in log.notes if line in note]

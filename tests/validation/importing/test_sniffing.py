@@ -414,6 +414,10 @@ REFUSED = {
         "'rpm' is a rate about one axis: a map takes it in [sensors.rate_reference], columns = [\"rpm\"], unit = ",
     ),
     "broken.zip": (b"PK\x03\x04" + bytes(100), "cannot be unpacked"),
+    "pointer.csv": (
+        b"version https://git-lfs.github.com/spec/v1\noid sha256:5450\nsize 87365\n",
+        "is a pointer of Git LFS, which stands in the place of the file; expected the file itself",
+    ),
 }
 
 
@@ -426,6 +430,14 @@ def test_what_is_no_log_is_refused_in_one_sentence(monkeypatch, tmp_path, capsys
     assert sentence in said
     assert said.count("\n") == 1
     assert not (tmp_path / "out" / "recording.toml").exists()
+
+
+def test_a_folder_without_a_table_says_why_its_first_file_is_none(monkeypatch, tmp_path, capsys):
+    (tmp_path / "raw").mkdir()
+    (tmp_path / "raw" / "README.md").write_text("A log of a disc.\n")
+    (tmp_path / "raw" / "imu.csv").write_bytes(REFUSED["pointer.csv"][0])
+    assert run(monkeypatch, "import", tmp_path / "raw", "--out", tmp_path / "out") == 2
+    assert "there (README.md, imu.csv); expected a logger's export (imu.csv: is a pointer" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

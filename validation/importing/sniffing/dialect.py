@@ -63,6 +63,7 @@ def dialect_of(path: Path) -> Dialect:
     lines = TextLines(path, encoding)
     comment = _comment(lines)
     sample = _sample(lines, comment)
+    _refuse_pointer(path, sample[0])
     _refuse_echo(path, sample)
     head = list(islice(lines, HEAD_LINES))
     if (labelled := _labelled(head, encoding) or _labelled(sample, encoding)) is not None:
@@ -75,6 +76,17 @@ def dialect_of(path: Path) -> Dialect:
     head = list(islice(lines, records[1] + 1))
     above = tuple(line.strip() for line in head[: records[0]] if line.strip())
     return replace(_named(path, head, layout, records[0], width, _remarks(layout)), preamble=above)
+
+
+def _refuse_pointer(path: Path, line: str) -> None:
+    """Refuse what a repository holds in a large file's place."""
+    if line.startswith("version https://git-lfs.github.com/"):
+        raise InputError.at(
+            path,
+            None,
+            "is a pointer of Git LFS, which stands in the place of the file; expected the file itself: run `git lfs "
+            "pull` where it was cloned, or take it by 'Download raw file' of its web page",
+        )
 
 
 def _refuse_echo(path: Path, sample: Sequence[str]) -> None:

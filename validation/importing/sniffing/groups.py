@@ -215,16 +215,25 @@ def triples_of(numbers: Numbers, taken: Sequence[int]) -> list[Triple]:
     free = [k for k in range(len(numbers.names)) if k not in apart]
     found = []
     for where in wheres:
-        by_base: dict[tuple[str, str], dict[int, int]] = defaultdict(dict)
         names = {k: read_name(numbers.names[k]) for k in free}
-        for k, name in names.items():
-            if name.axis is not None:
-                by_base[name.base, name.unit].setdefault(name.axis, k)
-        whole = {key: axes for key, axes in by_base.items() if set(axes) == {0, 1, 2}}
-        found += [_named(numbers, names, axes, where) for axes in whole.values()]
-        used = {k for axes in whole.values() for k in axes.values()}
+        whole = _named_alike(names)
+        found += [_named(numbers, names, axes, where) for axes in whole]
+        used = {k for axes in whole for k in axes.values()}
         found += _unnamed(numbers, [k for k in free if k not in used and says_nothing(names[k].base)], where)
     return [triple for triple in found if _has_readings(triple)]
+
+
+def _named_alike(names: Mapping[int, Name]) -> list[dict[int, int]]:
+    """Return the columns that share a name but for the axis, by axis; of the rest those that do in small letters."""
+    found: list[dict[int, int]] = []
+    for spelt in (str, str.casefold):  # GyroX and gyroX may stand for two sensors; gyroX, GyroY, GyroZ are one
+        used = {k for axes in found for k in axes.values()}
+        by_base: dict[tuple[str, str], dict[int, int]] = defaultdict(dict)
+        for k, name in names.items():
+            if name.axis is not None and k not in used:
+                by_base[spelt(name.base), spelt(name.unit)].setdefault(name.axis, k)
+        found += [axes for axes in by_base.values() if set(axes) == {0, 1, 2}]
+    return found
 
 
 def _named(

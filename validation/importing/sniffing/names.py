@@ -78,6 +78,8 @@ _STAND_BACK = {
 _CONVERTED = {"real", "si", "scaled", "converted"}
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
 _AS_READ = re.compile(r"\bang(?:ular)?[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
+#: An angular acceleration, which no sensor of a log reads.
+_ANGULAR = re.compile(r"\b(?:ang|angular|rot|rotational)[ _.-]?acc|winkelbeschl|\bacc\w*[ _.-]ang")
 _LINEAR = {"lin", "linear"}
 _TIME_STEMS = (
     "time zeit temps tiempo tempo tijd czas cas czas tid aika zaman vreme время час 时间 時間 시간 timestamp stamp "
@@ -219,7 +221,11 @@ def penalty_of(base: str) -> int:
 
     >>> penalty_of("lin_acc"), penalty_of("acc"), penalty_of("acc_real"), penalty_of("lin_acc_real")
     (9, 0, -1, 9)
+    >>> penalty_of("angAcc"), penalty_of("Angular Velocity"), penalty_of("rotRate"), penalty_of("rot_acc")
+    (9, 0, 0, 9)
     """
+    if _ANGULAR.search(_plain(base)):
+        return NO_READING
     words = _words_beside(base)
     back = sum(weight for weight, listed in _STAND_BACK.items() for word in listed.split() if word in words)
     return back if back or words.isdisjoint(_CONVERTED) else -1

@@ -82,6 +82,11 @@ _TIME = {spelling: unit for unit, spellings in _TIME_SPELLINGS.items() for spell
 #: A unit in brackets at the end, or behind a slash as German textbooks write it ("t / s").
 _BRACKETED = re.compile(r"^(.*?)[\s_]*[(\[{<]\s*([^()\[\]{}<>]*[^\W\d_][^()\[\]{}<>]*|[°%])\s*[)\]}>]\s*(.*)$")
 _SLASHED = re.compile(r"^(.*?)\s+/\s*(\S+)$")
+#: A unit that only its capital parts from a word for time or from an axis (tsMs, gyroXDps).
+_CAPITAL = re.compile(
+    r"^(ts?|.*(?:[Tt]ime|[Ss]tamp|[Ee]lapsed))(Ms|Us|Ns|Secs?)$|"
+    r"^(.*[a-z]_?[XYZ])(Dps|Mdps|Rads|Mps2|UT|Gauss|Mgauss|Mg)$"
+)
 
 
 def _plain(spelling: str) -> str:
@@ -104,6 +109,11 @@ def split_unit(name: str) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit (empty where there is none).
 
     Units stand in brackets, behind a slash with a blank before it, or as the last words after underscores or blanks.
+
+    >>> split_unit("gyro_x [deg/s]"), split_unit("tsMs"), split_unit("timestampUs"), split_unit("gyroXDps")
+    (('gyro_x', 'deg/s'), ('ts', 'Ms'), ('timestamp', 'Us'), ('gyroX', 'Dps'))
+    >>> split_unit("velMs"), split_unit("status"), split_unit("accX")
+    (('velMs', ''), ('status', ''), ('accX', ''))
     """
     bracketed = _BRACKETED.match(name)
     if bracketed and bracketed[2].strip().lower() not in ("x", "y", "z"):  # acc[x]
@@ -114,4 +124,7 @@ def split_unit(name: str) -> tuple[str, str]:
     for gap in list(re.finditer(r"[_\s-]+", name))[-3:]:  # m_s_2 is the longest
         if gap.start() and readings_of(name[gap.end() :]):
             return name[: gap.start()], name[gap.end() :]
+    if capital := _CAPITAL.match(name):
+        base, unit = capital[1] or capital[3], capital[2] or capital[4]
+        return base, unit
     return name, ""

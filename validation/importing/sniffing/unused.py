@@ -68,7 +68,25 @@ def missing_axes(tables: Sequence[Numbers], used: Collection[tuple[Path, str]], 
         for sensor in _SPELLINGS:
             if sensor not in found and sensor not in asked and (line := _not_alike(numbers, sensor, left)):
                 notes.append(line + _of(numbers, tables))
+                asked.add(sensor)
+        if "gyroscope" not in {*found, *asked} and (line := _one_rate(numbers, left)):
+            notes.append(line + _of(numbers, tables))
     return notes[:MOST_FILES]
+
+
+def _one_rate(numbers: Numbers, left: Sequence[int]) -> str | None:
+    """Return how a map takes the only column of a gyroscope, or None where there is none or more than one."""
+    names = {k: read_name(numbers.names[k]) for k in left}
+    rates = [k for k, name in names.items() if name.axis is not None and _meant(name.base, name.unit) == "gyroscope"]
+    if len(rates) != 1:
+        return None
+    units = [one.unit for one in readings_of(names[rates[0]].unit) if one.sensor == "gyroscope"]
+    unit = f'"{units[0]}"' if units else '"rad/s" or "deg/s"'
+    column = json.dumps(numbers.table.columns[rates[0]], ensure_ascii=False)
+    return (
+        f"of the gyroscope {'xyz'[names[rates[0]].axis or 0]} alone was found: a map takes it as a rate about the spin "
+        f"axis, [sensors.rate_reference] columns = [{column}], unit = {unit} (scale = -1 where body z is reversed)"
+    )
 
 
 def one_axis_rate(tables: Sequence[Numbers]) -> str | None:
