@@ -82,11 +82,8 @@ _TIME = {spelling: unit for unit, spellings in _TIME_SPELLINGS.items() for spell
 #: A unit in brackets at the end, or behind a slash as German textbooks write it ("t / s").
 _BRACKETED = re.compile(r"^(.*?)[\s_]*[(\[{<]\s*([^()\[\]{}<>]*[^\W\d_][^()\[\]{}<>]*|[°%])\s*[)\]}>]\s*(.*)$")
 _SLASHED = re.compile(r"^(.*?)\s+/\s*(\S+)$")
-#: A unit that only its capital parts from a word for time or from an axis (tsMs, gyroXDps).
-_CAPITAL = re.compile(
-    r"^(ts?|.*(?:[Tt]ime|[Ss]tamp|[Ee]lapsed))(Ms|Us|Ns|Secs?)$|"
-    r"^(.*[a-z]_?[XYZ])(Dps|Mdps|Rads|Mps2|UT|Gauss|Mgauss|Mg)$"
-)
+#: A unit that only its capital parts from a letter for time or for an axis (tsMs, gyroXDps).
+_CAPITAL = re.compile(r"^(ts?)(Ms|Us|Ns)$|^(.*[a-z]_?[XYZ])(Dps|Mdps|Rads|Mps2|UT|Gauss|Mgauss|Mg)$")
 
 
 def _plain(spelling: str) -> str:
@@ -110,8 +107,8 @@ def split_unit(name: str) -> tuple[str, str]:
 
     Units stand in brackets, behind a slash with a blank before it, or as the last words after underscores or blanks.
 
-    >>> split_unit("gyro_x [deg/s]"), split_unit("tsMs"), split_unit("timestampUs"), split_unit("gyroXDps")
-    (('gyro_x', 'deg/s'), ('ts', 'Ms'), ('timestamp', 'Us'), ('gyroX', 'Dps'))
+    >>> split_unit("gyro_x [deg/s]"), split_unit("tsMs"), split_unit("gyroXDps")
+    (('gyro_x', 'deg/s'), ('ts', 'Ms'), ('gyroX', 'Dps'))
     >>> split_unit("velMs"), split_unit("status"), split_unit("accX")
     (('velMs', ''), ('status', ''), ('accX', ''))
     """
