@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, made_log, three, write_table
 
+from discsim.errors import InputError
 from discsim.validation.importing.imported_log import import_log
 
 LOG = made_log()
@@ -80,3 +81,22 @@ def test_a_table_that_turns_at_a_steady_1000_deg_s_has_its_names_right(tmp_path)
     whole = import_log(write_table(tmp_path / "log.csv", columns))
     assert not any("EXCHANGED" in note for note in whole.notes)
     assert_allclose(np.abs(whole.recordings[0].samples["gyroscope"].value[:, 2]).max(), 2000 * DEG, rtol=0.01)
+
+
+def test_names_that_a_second_time_moved_by_a_column_are_refused(tmp_path):
+    """Its accelerometer was (time, x, y), without gravity at rest, and its gyroscope had gravity on it."""
+    late = np.random.default_rng(4).exponential(0.0008, LOG.t.size)
+    names = ["accelX", "accelY", "accelZ", "gyroX", "gyroY", "gyroZ"]
+    columns = [("timestamp", 1723940841.0 + LOG.t + late), (names[0], 1e3 * LOG.t)]
+    columns += [*three(names[1:4], LOG.accel), *zip(names[4:], LOG.gyro[:, :2].T, strict=True)]
+    with pytest.raises(InputError, match="'accelX' is the accelerometer's by its name and goes on as 'timestamp' does"):
+        import_log(write_table(tmp_path / "log.csv", columns))
+
+
+@pytest.mark.parametrize("rise", [1.0, 0.3])
+def test_a_reading_that_rises_is_no_time(tmp_path, rise):
+    """Its noise tells it, or how fast it rises."""
+    noise = np.random.default_rng(5).normal(0, 0.05 if rise == 1.0 else 1e-5, LOG.t.size)
+    mag = np.column_stack([rise * LOG.t + noise, LOG.mag[:, 1:]])
+    columns = [("t_s", LOG.t), *three(["gx", "gy", "gz"], LOG.gyro), *three(["mx", "my", "mz"], mag)]
+    assert import_log(write_table(tmp_path / "log.csv", columns)).recordings

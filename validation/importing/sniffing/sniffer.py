@@ -41,6 +41,7 @@ from discsim.validation.importing.sniffing.magnitudes import (
     gyroscope_unit,
     magnetometer_unit,
 )
+from discsim.validation.importing.sniffing.moved_names import refuse_moved_names
 from discsim.validation.importing.sniffing.names import NO_READING, is_time_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, clocks_of_files, own_clocks
 from discsim.validation.importing.sniffing.own_place import own_place
@@ -108,6 +109,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     sensors = [triple for triple, _ in found.values() if _on(clock, triple.numbers)]
     read_whole = [(triple.numbers, triple.values) for triple in sensors if triple.where is None]
     clock = with_shared_stamps(clock, read_whole)
+    refuse_moved_names(clock, sensors)
     tables += aside
     fixed, said = fixes_of(tables, clock, [triple.numbers for triple in sensors])
     if fixed is not None and any(fixed.numbers is numbers for numbers in aside):
