@@ -108,7 +108,7 @@ def _named(
         values.setdefault(name, ParameterValue(float(value), None))
     for name in candidate.row.untold.get(final.fit.plant.name, ()):
         values.setdefault(name, ParameterValue(candidate.row.sizes[name], None))
-    gain = max(less.score - final.score, 0.0)
+    gain = max(final.gain_upon(less), 0.0)
     k = len(parameters_of(candidate))
     bic = gain - k * float(np.log(max(final.fit.count, 2)))
     p = float(max(chi2_law.sf(gain, max(k, 1)), SMALLEST_P_VALUE))

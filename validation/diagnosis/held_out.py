@@ -12,7 +12,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, left_out
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import takes_its_place
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
@@ -43,9 +43,9 @@ def choices_without_each(found: Search, less: Mapping[str, ContinuousFit]) -> li
     for candidate in final.hypothesis.candidates:
         if candidate.name not in less or not _by_others(candidate):
             continue
-        gain = _scores_without_each(less[candidate.name]) - here
+        gain = _scores_without_each(less[candidate.name], final) - here
         rivals = [rival for rival in found.rivals.get(candidate.name, ()) if possible(rival.fitted)]
-        worse = [_scores_without_each(rival.fitted) - here for rival in rivals]
+        worse = [_scores_without_each(rival.fitted, final) - here for rival in rivals]
         for i, choice in enumerate(choices):
             better = [
                 (w[i], rival.candidate)
@@ -64,8 +64,11 @@ def _by_others(candidate: CandidateEffect) -> bool:
     return bool(candidate.columns) and (candidate.recordings is None or len(candidate.recordings) > 1)
 
 
-def _scores_without_each(fitted: ContinuousFit) -> FloatArray:
-    """Return what the score of a fit (r,) is without each recording, its parameters as the others have them."""
+def _scores_without_each(fitted: ContinuousFit, beside: ContinuousFit | None = None) -> FloatArray:
+    """Return what the score of a fit (r,) is without each recording, its parameters as the others have them.
+
+    On the readings that take part ``beside`` it, too, where another fit is given.
+    """
     fit = fitted.fit
     reduced = reduced_each(fit)
     total = np.sum([r.gram for r in reduced], axis=0)
@@ -75,7 +78,8 @@ def _scores_without_each(fitted: ContinuousFit) -> FloatArray:
         others = common_step(total - own.gram, fit.parameters, fit.at)[2]
         level = log_likelihood(linear, fit.noise, residual) - chi_squared(linear, fit.noise, residual)
         scores.append(fitted.score - (whole - others) - level)
-    return np.array(scores)
+    apart = left_out(fitted, beside) if beside is not None else np.zeros(len(scores))
+    return np.array(scores) - (np.sum(apart) - apart)
 
 
 def heldout_gain(found: Search, candidate: CandidateEffect, choices: Sequence[Choice]) -> float | None:

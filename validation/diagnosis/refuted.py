@@ -55,7 +55,7 @@ def _left_by_losses(found: Search) -> ContinuousFit | None:
             if t.row.acts_on != clock.row.acts_on or t in slow or t.fixed_values:
                 continue
             less = tried_without(found, t)
-            gain = less.score - final.score
+            gain = final.gain_upon(less)
             if (lossy and gain < SELECTION.refuted * price(t)) or _walks(less, clock, gain):
                 best = min((gain, less), best or (gain, less), key=lambda item: item[0])
     return None if best is None else best[1]

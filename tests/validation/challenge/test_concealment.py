@@ -284,6 +284,13 @@ def test_what_a_lag_does_to_the_phase_of_a_wobble_that_nobody_knows_makes_it_no_
     assert sizes(case)["gyro.lag"] < 8.0
 
 
+def test_that_a_simulated_lag_held_nothing_before_its_first_reading_makes_it_no_easier_to_see():
+    """The first reading alone did not lag: this lag of 0.26 ms, 2.6 standard deviations, counted as 2.2 limits."""
+    case = draw_case(687168)
+    assert [item.effect.id for item in case.concealed] == ["accel.bias_drift", "gyro.lag"]
+    assert sizes(case)["gyro.lag"] < 1.0
+
+
 def test_no_effect_is_scaled_beyond_the_largest_that_are_drawn():
     wind = effect("air.wind", w_north_m_s=0.3, w_east_m_s=0.4)
     assert scaled(wind, 2.0, "flight").value == effect("air.wind", w_north_m_s=0.6, w_east_m_s=0.8).value

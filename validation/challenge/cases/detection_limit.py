@@ -21,7 +21,7 @@ from scipy.interpolate import BSpline
 from discsim.arrays import BoolArray, FloatArray
 from discsim.disc import Disc, Release, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect
-from discsim.effects.sensors import DroppedSamples
+from discsim.effects.sensors import DroppedSamples, Lag
 from discsim.effects.timing_rows import LostRows
 from discsim.frames import body_to_ned
 from discsim.motion import Motion, State
@@ -305,6 +305,10 @@ class _Sheet:
         for name, (_, value) in base.items():
             limit = getattr(case.sheets_of.sensors[name], "range", np.inf)
             kept[name] = np.isfinite(value) & (np.abs(value) < 0.999 * limit)
+        for item in case.concealed:
+            # what it held before the first reading nobody knows; that a simulated one held nothing is no evidence
+            if item.effect.row.type is Lag and not case.hands:
+                kept[item.effect.row.acts_on][:1] = False
         return cls(case, base, kept)
 
     def column(self, made: Readings, step: float) -> FloatArray:

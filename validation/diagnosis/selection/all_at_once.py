@@ -68,7 +68,7 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     if not fits:
         return None
     fitted = _simpler(found, min(fits, key=lambda one: _charged(found, one)), competing)
-    return fitted if found.base.score - fitted.score > sum(map(price, fitted.hypothesis.candidates)) else None
+    return fitted if fitted.gain_upon(found.base) > sum(map(price, fitted.hypothesis.candidates)) else None
 
 
 def _many(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:

@@ -33,7 +33,7 @@ from discsim.validation.identification.residual_tests import UnmodelledResidual,
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import CLOCKS
 
-__all__ = ["ContinuousFit", "continuous_fit", "standard_errors", "wider_with"]
+__all__ = ["ContinuousFit", "continuous_fit", "left_out", "standard_errors", "wider_with"]
 
 #: the numbers of a cross-axis error that a turn has opposite
 _PAIRS = (("sxy", "syx"), ("sxz", "szx"), ("syz", "szy"))
@@ -106,7 +106,11 @@ class ContinuousFit:
         A lag remembers what nobody recorded, so that the first readings of its sensor take no part. Whether these
         happen to fit well without it is no evidence.
         """
-        return self.score - other.score - _left_out(self, other) + _left_out(other, self)
+        return self.score - other.score - float(np.sum(left_out(self, other)))
+
+    def gain_upon(self, other: ContinuousFit) -> float:
+        """Return what it gains upon another fit, as upon one without one of its effects, on the readings of both."""
+        return other.worse_than(self)
 
     @property
     def charged(self) -> float:
@@ -226,13 +230,21 @@ def _clocks_of_longer_beginnings(fit: Fit) -> FloatArray:
     return at
 
 
-def _left_out(fitted: ContinuousFit, beside: ContinuousFit) -> float:
-    """Return what of a fit's score are readings that a lag of another leaves out, for it remembers what came before."""
+def left_out(fitted: ContinuousFit, beside: ContinuousFit) -> FloatArray:
+    """Return what of a fit's score (r,) are readings of each recording that a lag of another leaves out, less its own.
+
+    A lag remembers what came before the first reading.
+    """
+    return _left_out(fitted, beside) - _left_out(beside, fitted)
+
+
+def _left_out(fitted: ContinuousFit, beside: ContinuousFit) -> FloatArray:
     lags = {candidate.row.acts_on for candidate in beside.hypothesis.candidates if candidate.row.type is Lag}
+    total = np.zeros(len(fitted.fit.linears))
     if not lags:
-        return 0.0
-    total = 0.0
-    for linear, residual, less in zip(fitted.fit.linears, fitted.residuals, beside.fit.linears, strict=True):
+        return total
+    each = zip(fitted.fit.linears, fitted.residuals, beside.fit.linears, strict=True)
+    for i, (linear, residual, less) in enumerate(each):
         begun = {(c.sensor, c.axis): int(c.index[0]) for c in less.channels if c.sensor in lags}
         counts = {
             (c.sensor, c.axis): int(np.searchsorted(c.index, begun[c.sensor, c.axis]))
@@ -240,7 +252,7 @@ def _left_out(fitted: ContinuousFit, beside: ContinuousFit) -> float:
             if (c.sensor, c.axis) in begun
         }
         if any(counts.values()):
-            total += log_likelihood_of_first(linear, fitted.scored_in, residual, counts)
+            total[i] = log_likelihood_of_first(linear, fitted.scored_in, residual, counts)
     return total
 
 

@@ -67,7 +67,7 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
             bars=in_reach(final),
         )
         wide = found.with_cost(wide)
-        if wide.score - final.score < scope_price(len(found.recordings)) and possible(wide):
+        if final.gain_upon(wide) < scope_price(len(found.recordings)) and possible(wide):
             final = wide
     return final
 
@@ -89,7 +89,7 @@ def eliminated_backward(found: Search, current: ContinuousFit, kept: Collection[
                 bars=in_reach(current),
             )
             less = found.with_cost(less)
-            if less.score - current.score < price(candidate) and (weakest is None or less.score < weakest.score):
+            if current.gain_upon(less) < price(candidate) and (weakest is None or less.score < weakest.score):
                 weakest = less
         if weakest is None:
             return current
@@ -135,8 +135,7 @@ def without_superfluous(found: Search) -> Search:
             refitting("beginning anew without", candidate.id, number, len(found.final.hypothesis.candidates))
             less = tried_without(found, candidate)
             found = found if any(step is less for step in found.steps) else found.with_step(less)
-            worse = less.worse_than(found.final)
-            if worse < price(candidate) and (weakest is None or less.score < weakest.score):
+            if found.final.gain_upon(less) < price(candidate) and (weakest is None or less.score < weakest.score):
                 weakest = less
         if weakest is None:
             return found

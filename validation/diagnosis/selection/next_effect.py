@@ -90,7 +90,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
         refitted = found.with_cost(refitted, cost)
-        found = _considering(found, current.score, refitted, screened.candidate)
+        found = _considering(found, current, refitted, screened.candidate)
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
             charged = refitted.charged + refitted.prior_penalty
@@ -123,7 +123,7 @@ def next_two(found: Search, alone: ContinuousFit | None = None) -> tuple[Search,
         refitting("refitting with two", " and ".join(c.id for c in pair.hypothesis.candidates), number, len(chosen))
         both = _fit_of_two(found, found.relaxed_fit, pair.hypothesis, {**pair.start, **wobbles(found.relaxed_fit)})
         for candidate in pair.hypothesis.candidates:
-            found = _considering(found, found.base.score, both, candidate)
+            found = _considering(found, found.base, both, candidate)
         if not _counts(found, both):
             continue
         best = both if best is None or both.worse_than(best) < 0.0 else best
@@ -141,7 +141,7 @@ def _fit_of_two(found: Search, about: Fit, hypothesis: Hypothesis, start: Start,
 
 def _counts(found: Search, both: ContinuousFit) -> bool:
     """Tell whether a fit of two effects is worth their price and comes near the data."""
-    worth = found.base.score - both.score > sum(map(price, both.hypothesis.candidates))
+    worth = both.gain_upon(found.base) > sum(map(price, both.hypothesis.candidates))
     return worth and possible(both) and not far(found, both)
 
 
@@ -268,14 +268,14 @@ def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandid
     )
 
 
-def _considering(found: Search, before: float, refitted: ContinuousFit, candidate: CandidateEffect) -> Search:
-    """Return a search that knows what a candidate gains upon a fit whose score was ``before``."""
+def _considering(found: Search, before: ContinuousFit, refitted: ContinuousFit, candidate: CandidateEffect) -> Search:
+    """Return a search that knows what a candidate gains upon the fit ``before``."""
     values = {
         q.name: float(v)
         for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
         if q.group == candidate.id and q.recordings == candidate.recordings
     }
-    one = Considered(candidate, before - refitted.score, in_parameters(candidate.row, values))
+    one = Considered(candidate, refitted.gain_upon(before), in_parameters(candidate.row, values))
     return replace(found, considered=(*found.considered, one))
 
 

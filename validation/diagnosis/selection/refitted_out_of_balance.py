@@ -46,6 +46,6 @@ def _with_what_is_worth_it(found: Search, final: ContinuousFit, candidates: Sequ
             continue
         fitted = continuous_fit(fit, Hypothesis(more), found.own, fit.noise, values_of_fit(final))
         fitted = found.with_cost(fitted)
-        if final.score - fitted.score > price(candidate):
+        if fitted.gain_upon(final) > price(candidate):
             final = fitted
     return final

@@ -101,7 +101,7 @@ def _taken_over(found: Search, before: Search) -> Search:
     if not possible(fitted) or far(found, fitted):
         return found
     fitted = eliminated_backward(found, fitted)
-    worth = found.base.score - fitted.score > sum(map(price, fitted.hypothesis.candidates))
+    worth = fitted.gain_upon(found.base) > sum(map(price, fitted.hypothesis.candidates))
     return _with_final(found, fitted) if worth else found
 
 
@@ -276,10 +276,10 @@ def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) ->
     candidate = better.hypothesis.candidates[-1]
     if candidate.fixed_values:
         return None
-    gain = current.score - better.score
+    gain = better.gain_upon(current)
     doubted = found.relaxed_fit.plant.weakly_identified and gain <= SELECTION.doubtful
     if not doubted and better.squared_sizes(candidate) > SELECTION.borne_out * gain:
         return None
     start = values_of_fit(better)
     again = found.with_cost(continuous_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start))
-    return again if again.score - better.score < price(candidate) else None
+    return again if better.gain_upon(again) < price(candidate) else None
