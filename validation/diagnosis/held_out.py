@@ -39,7 +39,7 @@ def choices_without_each(found: Search, less: Mapping[str, ContinuousFit]) -> li
     ]
     if count < 2:
         return list(choices)
-    here = _scores_without_each(final) if final.hypothesis.candidates else np.zeros(count)
+    here = _scores_without_each(final, final) if final.hypothesis.candidates else np.zeros(count)
     for candidate in final.hypothesis.candidates:
         if candidate.name not in less or not _by_others(candidate):
             continue
@@ -64,10 +64,10 @@ def _by_others(candidate: CandidateEffect) -> bool:
     return bool(candidate.columns) and (candidate.recordings is None or len(candidate.recordings) > 1)
 
 
-def _scores_without_each(fitted: ContinuousFit, beside: ContinuousFit | None = None) -> FloatArray:
+def _scores_without_each(fitted: ContinuousFit, beside: ContinuousFit) -> FloatArray:
     """Return what the score of a fit (r,) is without each recording, its parameters as the others have them.
 
-    On the readings that take part ``beside`` it, too, where another fit is given.
+    It is that on the readings that take part in the fit ``beside`` it, too.
     """
     fit = fitted.fit
     reduced = reduced_each(fit)
@@ -78,7 +78,7 @@ def _scores_without_each(fitted: ContinuousFit, beside: ContinuousFit | None = N
         others = common_step(total - own.gram, fit.parameters, fit.at)[2]
         level = log_likelihood(linear, fit.noise, residual) - chi_squared(linear, fit.noise, residual)
         scores.append(fitted.score - (whole - others) - level)
-    apart = left_out(fitted, beside) if beside is not None else np.zeros(len(scores))
+    apart = left_out(fitted, beside)
     return np.array(scores) - (np.sum(apart) - apart)
 
 

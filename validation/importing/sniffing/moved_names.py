@@ -18,6 +18,8 @@ __all__ = ["refuse_moved_names"]
 
 #: Rows of which a clock is told from a reading that happens to rise as fast, at least.
 FEWEST = 50
+#: Share of the rows at which it goes on: rows that stand twice or in another order are fewer.
+RISING = 0.99
 #: Two clocks of one board are as fast to this share (crystals to a ten-thousandth, oscillators to a few per cent).
 AS_FAST = 0.05
 #: ... and a line through one against the other leaves this share of the usual step at most; stamps of a computer that
@@ -30,9 +32,11 @@ def refuse_moved_names(clock: Clock, triples: Iterable[Triple]) -> None:
     for triple in triples:
         if clock.column not in triple.numbers.table.columns:
             continue
-        time = seconds(clock, triple.numbers)[triple.rows]
-        for k, name in enumerate(triple.names):
-            if (unit := _unit_of_time(time, triple.values[:, k])) is not None:
+        for name, value in zip(triple.names, triple.values.T, strict=True):
+            # no reading rises in every row: the stamps, which may be dates, are read for one that does alone
+            if not _rises(value):
+                continue
+            if (unit := _unit_of_time(seconds(clock, triple.numbers)[triple.rows], value)) is not None:
                 raise InputError.at(
                     triple.numbers.path,
                     None,
@@ -42,10 +46,15 @@ def refuse_moved_names(clock: Clock, triples: Iterable[Triple]) -> None:
                 )
 
 
+def _rises(value: FloatArray) -> bool:
+    sound = value[np.isfinite(value)]
+    return sound.size >= FEWEST and bool(np.mean(np.diff(sound) > 0.0) >= RISING)
+
+
 def _unit_of_time(time: FloatArray, value: FloatArray) -> str | None:
     """Return the unit in which a column (n,) goes on as the times of its rows, s, do; None where it does not."""
     sound = np.isfinite(time) & np.isfinite(value)
-    if np.count_nonzero(sound) < FEWEST or np.mean(np.diff(value[sound]) > 0.0) < 0.99:
+    if not _rises(value[sound]):
         return None
     t, v = time[sound] - time[sound][0], value[sound]
     slope, start = np.polyfit(t, v, 1) if np.ptp(t) > 0.0 else (0.0, 0.0)

@@ -152,23 +152,20 @@ def _read(raw: Path) -> tuple[list[_File], list[InputError]]:
         names = ", ".join(path.name for path in paths[:8]) or "nothing"
         folders = ", ".join(sorted(path.name for path in raw.iterdir() if path.is_dir())[:8])
         also = f"; there are folders in it ({folders}): import one of them, unpacked" if folders else ""
-        what = f"no table of numbers in the files there ({names}){also}; expected a logger's export"
-        raise InputError.at(raw, None, f"{what}{''.join(_first_words(raw, failures))}")
+        first = "".join(f" ({line})" for line in _said(raw, failures)[:1])
+        what = f"no table of numbers in the files there ({names}){also}; expected a logger's export{first}"
+        raise InputError.at(raw, None, what)
     return files, failures
 
 
-def _first_words(raw: Path, failures: Sequence[InputError]) -> list[str]:
-    """Return why the first file of a folder is no table, in brackets; nothing of words to read and pictures."""
-    return [f" ({line})" for line in _said(raw, failures)[:1]]
-
-
 def _said(raw: Path, failures: Sequence[InputError]) -> list[str]:
+    """Return why each file of a folder is no table, but for words to read and pictures."""
     said = [str(failure).removeprefix(f"{raw}/").removeprefix(f"{raw}\\") for failure in failures]
     return [line for line in said if not BESIDE.search(line.partition(":")[0])]
 
 
 def _unread(raw: Path, failures: Sequence[InputError]) -> list[str]:
-    """Return a line for each file of a folder that is no table, but for words to read and pictures."""
+    """Return a line for each file of a folder that is left out, the first of many alone."""
     said = _said(raw, failures)
     more = [f"left out: {len(said) - MOST_UNREAD} more files that are no tables"] * (len(said) > MOST_UNREAD)
     return [*(f"left out: {line}" for line in said[:MOST_UNREAD]), *more]
