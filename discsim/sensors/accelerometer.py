@@ -89,12 +89,14 @@ class Accelerometer(BoardSensor):
 
     def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
         """Return S_T f + bias, Eq. (5), (..., n, 3) m/s^2."""
-        f = specific_force(state, surroundings, self.position + np.array(self.offset))
-        f = on_board(BoardRotation(*self.misalignment), on_board(self.board, f))
-        if any(self.scale) or any(self.cross_axis):
-            f = f @ sensitivity(self.scale, self.cross_axis).T
+        f = self.reading_of(specific_force(state, surroundings, self.position + np.array(self.offset)))
         f = f + np.array(self.bias)
         return np.asarray(f + bias_drift(self.drift, state.t) if any(self.drift) else f)
+
+    def reading_of(self, f: FloatArray) -> FloatArray:
+        """Return what a specific force (..., 3) m/s^2 in B alone reads: S_T f of a sensor that is turned in B."""
+        f = on_board(BoardRotation(*self.misalignment), on_board(self.board, f))
+        return f @ sensitivity(self.scale, self.cross_axis).T if any(self.scale) or any(self.cross_axis) else f
 
     @property
     def limit(self) -> float:

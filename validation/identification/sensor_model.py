@@ -7,6 +7,7 @@ range are the fit's business.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any, TypeVar
 
@@ -97,17 +98,23 @@ def predicted(
         readings = model.reading(state, around, _felt(recording, values, t) if any(model.g_sensitivity) else None)
     else:
         readings = model.reading(state, around)
-    if sensor == "accelerometer":
-        limit = sized(values, AccelerometerSaturation).limit_m_s2
+    limit = sized(values, AccelerometerSaturation).limit_m_s2 if sensor == "accelerometer" else np.inf
+
+    def shown(readings: FloatArray) -> FloatArray:
+        """Return readings (..., m, 3) as they are with a limit, and with effects that act on whole readings."""
         readings = np.clip(readings, -limit, limit) if np.isfinite(limit) else readings
-    for effect in effects.called_on(sensor):
-        sizes = [values.get((effect.id, name), none) for name, none in effect.row.sizes.items()]
-        if sizes != list(effect.value) and effect.applied is not None:
-            times = np.broadcast_to(t, rows.shape[:-1]).ravel()
-            flat = _state(times, rows.reshape(-1, rows.shape[-1]))
-            changed = effect.applied.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, flat)
-            readings = changed.reshape(readings.shape)
-    return readings
+        for effect in effects.called_on(sensor):
+            sizes = [values.get((effect.id, name), none) for name, none in effect.row.sizes.items()]
+            if sizes != list(effect.value) and effect.applied is not None:
+                times = np.broadcast_to(t, rows.shape[:-1]).ravel()
+                flat = _state(times, rows.reshape(-1, rows.shape[-1]))
+                changed = effect.applied.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, flat)
+                readings = changed.reshape(readings.shape)
+        return np.asarray(readings)
+
+    if isinstance(model, Accelerometer) and not plant_of(recording).path_known:
+        return _with_lift(model.reading_of(_ALONG_Z), readings, shown, lambda: _felt(recording, values, t))
+    return shown(readings)
 
 
 def sensed(sensor: str, recording: Recording, values: Values, effects: Competing = CATALOGUED) -> tuple[str, ...]:
@@ -174,6 +181,29 @@ def _surroundings(recording: Recording, values: Values) -> Surroundings:
     # where the path is unknown, gravity turns with the spin as the translation does: both are left to the means
     gravity = values.get(("environment", "gravity"), environment.gravity) if plant_of(recording).path_known else 0.0
     return Surroundings(np.array(field), gravity, np.array(centre_of_mass(sized(values, MassImbalance))))
+
+
+_ALONG_Z = np.array([0.0, 0.0, 1.0])
+#: least share of the force along z that the z axis reads, for that axis to tell it: one turned by 60 degrees
+_SHARE = 0.5
+
+
+def _with_lift(
+    along: FloatArray,
+    readings: FloatArray,
+    shown: Callable[[FloatArray], FloatArray],
+    felt: Callable[[], FloatArray | None],
+) -> FloatArray:
+    """Return readings (..., m, 3) of a sensor that reads some of the force along z on other axes, with that force.
+
+    Where the path is unknown the motion does not tell lift and gravity along z: the z axis itself has read it, as part
+    of what was ``felt`` (m, 3). A force of 1 m/s^2 along z reads ``along`` (3,), before it is ``shown``.
+    """
+    without = shown(readings)
+    slope = shown(readings + along) - without
+    if not np.any(slope[..., :2]) or np.min(np.abs(slope[..., 2])) < _SHARE or (whole := felt()) is None:
+        return without
+    return shown(readings + ((whole[:, 2] - without[..., 2]) / slope[..., 2])[..., None] * along)
 
 
 def _felt(recording: Recording, values: Values, t: FloatArray) -> FloatArray | None:
