@@ -201,7 +201,9 @@ def _with_lift(
     """
     without = shown(readings)
     slope = shown(readings + along) - without
-    if not np.any(slope[..., :2]) or np.min(np.abs(slope[..., 2])) < _SHARE or (whole := felt()) is None:
+    # of a motion that ran beyond all numbers there is none
+    tells = bool(np.any(slope[..., :2])) and bool(np.min(np.abs(slope[..., 2])) >= _SHARE)
+    if not tells or (whole := felt()) is None:
         return without
     return shown(readings + ((whole[:, 2] - without[..., 2]) / slope[..., 2])[..., None] * along)
 
