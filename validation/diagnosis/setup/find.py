@@ -67,8 +67,8 @@ TWIN = 8.0
 #: than this share of it: a wobble that dies moves an axis by 0.003, a soft iron of some per cent the field's by 0.02
 _TILTED, _ALIKE = 0.02, 0.5
 #: what is judged of a long recording turns at this share of the fastest rate or more, asked every so many s (half a
-#: turn at 6 rad/s)
-_QUARTER, _SLOT = 0.25, 0.5
+#: turn at 6 rad/s), of a slow log every so many readings: one alone scatters about no mean
+_QUARTER, _SLOT, _READINGS = 0.25, 0.5, 4
 #: most faults of one setup that are looked for, and most twins that are told
 MOST, MOST_TWINS = 3, 8
 
@@ -354,7 +354,8 @@ def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, floa
     if turning.t[-1] - turning.t[0] <= length:
         longer = any(len(one) and one.t[-1] - one.t[0] > length for one in samples.values())
         return (float(turning.t[0]), float(turning.t[0]) + length) if longer else None
-    slot = ((turning.t - turning.t[0]) / _SLOT).astype(int)
+    width = max(_SLOT, _READINGS * float(turning.t[-1] - turning.t[0]) / (len(turning) - 1))
+    slot = ((turning.t - turning.t[0]) / width).astype(int)
     count = np.maximum(np.bincount(slot), 1)
     value = np.nan_to_num(turning.value)
     square = np.bincount(slot, np.sum(value**2, axis=1)) / count
@@ -364,9 +365,12 @@ def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, floa
         square = np.maximum(square - np.sum(mean**2, axis=1), 0.0)
     fast = np.concatenate([[False], square > _QUARTER**2 * np.max(square), [False]])
     starts, stops = np.flatnonzero(~fast[:-1] & fast[1:]), np.flatnonzero(fast[:-1] & ~fast[1:])
+    if not starts.size:
+        # a sensor that steps from one reading to another once shows no turning in any slot
+        return float(turning.t[0]), float(turning.t[0]) + length
     longest = int(np.argmax(stops - starts))
-    first = float(turning.t[0]) + _SLOT * float(starts[longest])
-    return first, first + min(length, _SLOT * float(stops[longest] - starts[longest]))
+    first = float(turning.t[0]) + width * float(starts[longest])
+    return first, first + min(length, width * float(stops[longest] - starts[longest]))
 
 
 def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effect, ...]]:

@@ -226,3 +226,13 @@ def test_lost_samples_in_each_throw_are_a_rival_of_a_shift_of_times():
     assert sound.found == ()
     beyond = {name: each - sound.as_written.cost for name, each in cost.items()}
     assert beyond["accelerometer.losses"] < 0.5 * min(beyond["accelerometer.clock"], beyond["accelerometer.lag"])
+
+
+@pytest.mark.parametrize("stepped", [False, True], ids=["slow", "one-step"])
+def test_a_log_with_a_reading_every_two_seconds_is_looked_at(stepped):
+    """One reading in half a second scatters about no mean: none turned fastest, and the command ended in an error."""
+    (first, _) = throws(plant="free_spin")
+    fast = first.samples["accelerometer"]
+    value = np.where(np.arange(300)[:, None] < 37, 1.0, 1.1) * np.ones(3) if stepped else fast.value[:300]
+    slow = replace(first, samples={"accelerometer": replace(fast, t=2.2 * np.arange(300.0), value=value)})
+    assert find_setup_faults([slow]).faults == ()
