@@ -312,7 +312,9 @@ def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _No
     if count < SHORTEST:
         return False
     noise = quiet.steps(axis, at_top)
-    if not TOGGLING <= noise < NOISIEST * top / step:
+    if noise >= NOISIEST * top / step:
+        return _stands_out(column[np.isfinite(column)], top, step)
+    if not noise >= TOGGLING:
         return False
     # the best chance that a constant input has of one reading, and of that one before any larger
     chance = max(erf(1.0 / (2.0 * np.sqrt(2.0) * noise)), 1e-12)
@@ -323,6 +325,19 @@ def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _No
     by_chance = equal * np.log(2.0 * chance / (1.0 + chance))
     often = equal >= FEWEST and equal > max(DENSER * expected, _most_frequent(column, top, step))
     return noise >= 1.0 and often and by_chance < np.log(CHANCE)
+
+
+def _stands_out(column: FloatArray, top: float, step: float) -> bool:
+    """Tell whether the largest of readings (n,) comes more often than a rough motion that ends there by chance.
+
+    One that goes on past no limit thins out towards its largest reading: that comes no more often than those below.
+    """
+    equal, expected = _equal(column, top, step)
+    if equal < FEWEST or equal <= max(DENSER * expected, _most_frequent(column, top, step)):
+        return False
+    # how often a Poisson count of this mean comes that often, from above
+    mean = DENSER * expected
+    return bool(equal * (1.0 - np.log(equal / mean)) - mean < np.log(CHANCE))
 
 
 def _most_frequent(column: FloatArray, top: float, step: float) -> int:

@@ -165,3 +165,29 @@ def test_noise_found_piece_by_piece_is_that_of_the_whole(monkeypatch):
     monkeypatch.setattr(clipping, "PIECE", 100)
     np.testing.assert_array_equal(limits(seen), whole)
     assert np.array_equal(clipped(seen.copy(), None, None), found)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("step", [0.01, 0.0])
+def test_a_rough_motion_is_clipped_where_its_largest_reading_stands_out(step, seed):
+    """A rocket's motor shakes a part of 2 g: three of four readings stood at its limit, and none was said to."""
+    rng = np.random.default_rng(seed)
+    shaken = rng.normal([0.3, 0.5, 2.2], [0.8, 0.7, 0.4], (900, 3))
+    written = step * np.rint(shaken / step) if step else shaken
+    assert not np.any(clipped(written, None, None))
+    at_end = np.clip(written, -2.0, 1.98)
+    assert np.array_equal(clipped(at_end, None, None)[:, 2], at_end[:, 2] == 1.98)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("shape", ["uniform", "sine", "heavy"])
+def test_a_rough_motion_that_ends_by_itself_is_not_clipped(shape, seed):
+    """A crest in rough motion has more readings than what lies below it has, as far as `DENSER` goes."""
+    rng = np.random.default_rng(seed)
+    n = 3000
+    value = {
+        "uniform": rng.uniform(-1.0, 1.0, (n, 3)),
+        "sine": np.sin(rng.uniform(0.0, 2 * np.pi, (n, 3))),
+        "heavy": np.tanh(rng.normal(0.0, 0.5, (n, 3))),
+    }[shape]
+    assert not np.any(clipped(np.rint(value / 0.01) * 0.01, None, None))

@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from discsim.environment import Environment
@@ -124,7 +125,9 @@ class ImportedLog(Result):
             label = f"{number:02d} " if len(self.imported) > 1 else ""
             for sensor, samples in recording.samples.items():
                 span = f"{samples.t[0]:.3f} to {samples.t[-1]:.3f} s"
-                lines.append(f"{label}{sensor}: {len(samples)} samples, {span}, {samples.gaps} gaps")
+                missing = np.isnan(samples.value)
+                gaps = np.count_nonzero(missing[..., ~missing.all(axis=0)])  # a velocity that no receiver tells is none
+                lines.append(f"{label}{sensor}: {len(samples)} samples, {span}, {gaps} gaps")
         lines += [f"throw {number}: {found.text}" for number, found in enumerate(self.throws, start=1)]
         if self.part.whole and self.throws:
             lines.append(f"the whole log was taken; --throw {'1' if len(self.throws) == 1 else 'N'} takes one throw")

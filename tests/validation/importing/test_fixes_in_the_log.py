@@ -49,6 +49,21 @@ def test_fixes_between_empty_or_repeated_rows_are_read_once_each(tmp_path, every
     assert [note for note in done.notes if note.startswith("left out: 'speed', 'heading' of log.csv")]
 
 
+def test_a_rotation_velocity_is_a_gyroscopes_and_no_gap_is_counted_where_nothing_is_told(tmp_path):
+    """A flight simulator's turned out to be a speed of the receiver, whose empty velocities made three gaps a row."""
+    rows = [
+        f"{2.2 * k:.1f},{0.1 * np.sin(k):.5f},{0.1 * np.cos(k):.5f},0.02,{fix(2.2 * k, (250.0,))}" for k in range(300)
+    ]
+    names = ",".join(f"ROTATION VELOCITY BODY {axis}" for axis in "XYZ")
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([f"t,{names},LATITUDE,LONGITUDE,ALTITUDE,GROUND VELOCITY", *rows, ""]))
+    done = import_log(path)
+    assert done.recordings[0].samples["gyroscope"].value.shape == (300, 3)
+    (left,) = [note for note in done.notes if note.startswith("left out")]
+    assert left.startswith("left out: 'GROUND VELOCITY' of log.csv")
+    assert [line for line in done.lines if line.startswith("gps: 300 samples") and line.endswith(" 0 gaps")]
+
+
 def test_zeros_before_the_first_fix_are_none(tmp_path):
     raw = log(tmp_path, lambda k: fix(LOG.t[k // 40 * 40]) if k > 400 else "0,0,0,0,0")
     gps = import_log(raw).recordings[0].samples["gps"]

@@ -74,6 +74,25 @@ def test_a_full_scale_is_one_at_which_readings_stand_longer_than_a_free_spin_doe
         assert found[0] == pytest.approx(2000 * DEG)
 
 
+@pytest.mark.parametrize(
+    ("ends", "step", "told"),
+    [
+        ((250.13, -250.14), 0.01, True),  # 131 counts per deg/s, as a MPU-6050's data sheet has it
+        ((250.13, -249.0), 0.01, False),
+        ((2000.0, -2000.0), 1.0, False),  # whole deg/s: two largest rates may come to lie there
+    ],
+)
+def test_both_ends_of_a_full_scale_are_not_met_by_chance(ends, step, told):
+    """A board shaken by hand at 10 rows a second clips for one reading at a time."""
+    rng = np.random.default_rng(7)
+    value = np.clip(rng.normal(0.0, 0.5 * ends[0], (150, 3)), ends[1], ends[0])
+    found = full_scale(Reading3(0.1 * np.arange(150), step * np.rint(value / step) * DEG))
+    assert (found is not None) == told
+    if found is not None:
+        assert found[0] == pytest.approx(2**15 / 131 * DEG)
+        assert "both its ends" in found[1].text
+
+
 def test_a_reading_beyond_shows_a_wider_range():
     t = np.arange(0.0, 3.0, 0.002)
     value = np.column_stack([np.full(t.size, 40.0) + (t > 2), np.zeros(t.size), np.where(t < 2, 1000.0, 1200.0)])

@@ -18,7 +18,7 @@ from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Numbers
-from discsim.validation.importing.sniffing.names import last_word, read_name, words_of
+from discsim.validation.importing.sniffing.names import last_word, read_name, sensor_of, words_of
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 from discsim.validation.importing.stamps import DATED, DAY, EPOCH
 
@@ -207,7 +207,11 @@ def _times(clock: Clock, numbers: Numbers) -> Readings:
 def _no_velocity(found: ProposedFixes) -> list[str]:
     """Say of columns of speed and heading, or of parts of a velocity, why they are left out."""
     names = zip(found.numbers.table.columns, found.numbers.names, strict=True)
-    left = [f"'{column}'" for column, name in names if words_of(name) & _MOTION or _part(name)]
+    left = [
+        f"'{column}'"
+        for column, name in names
+        if (words_of(name) & _MOTION or _part(name)) and sensor_of(read_name(name).base) != "gyroscope"
+    ]
     if not left or len(found.columns) > 3:
         return []
     what = f"left out: {', '.join(left)} of {found.numbers.path.name}"

@@ -39,6 +39,7 @@ class Name(NamedTuple):
 _STEMS = {
     "gyroscope": (
         "gyr giro ziro zyro jiro гиро ジャイロ 陀螺 자이로 omega rotationrate rotrate angularvel angvel angularrate "
+        "rotationvel rotationalvel "
         "winkelgeschw drehrate vitesseangulaire vitessederotation velocidadangular velocitaangolare 각속도 角速度"
     ),
     "magnetometer": "mag compass kompass boussole bussola магн 磁 자기 manyetik hmc58 qmc58 lis3m mmc5 ak8963",
@@ -77,7 +78,7 @@ _STAND_BACK = {
 #: Words of what a program converted: it goes before the counts beside it.
 _CONVERTED = {"real", "si", "scaled", "converted"}
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
-_AS_READ = re.compile(r"\bang(?:ular)?[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
+_AS_READ = re.compile(r"\b(?:ang(?:ular)?|rot(?:ation(?:al)?)?)[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
 #: An angular acceleration, which no sensor of a log reads.
 _ANGULAR = re.compile(r"\b(?:ang|angular|rot|rotational)[ _.-]?acc|winkelbeschl|\bacc\w*[ _.-]ang")
 _LINEAR = {"lin", "linear"}
@@ -221,8 +222,8 @@ def penalty_of(base: str) -> int:
 
     >>> penalty_of("lin_acc"), penalty_of("acc"), penalty_of("acc_real"), penalty_of("lin_acc_real")
     (9, 0, -1, 9)
-    >>> penalty_of("angAcc"), penalty_of("Angular Velocity"), penalty_of("rotRate"), penalty_of("rot_acc")
-    (9, 0, 0, 9)
+    >>> [penalty_of(name) for name in ("angAcc", "Angular Velocity", "rotation velocity", "rotRate", "rot_acc")]
+    [9, 0, 0, 0, 9]
     """
     if _ANGULAR.search(_plain(base)):
         return NO_READING

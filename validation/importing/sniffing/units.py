@@ -20,13 +20,15 @@ class Reading(NamedTuple):
 COUNTS = "counts"
 OTHER = "other"
 _ACCELERATION = {
-    "m/s^2": "m/s2 m/(s2) m/s/s m/s**2 ms-2 ms2 mps2 mpss m/sec2 mss ms^-2 m_s2 m_s_2 m_s^2 meterpersecond2 м/с2 m/s²",
+    "m/s^2": "m/s2 m/(s2) m/s/s m/s**2 ms-2 ms2 mps2 mpss m/sec2 mss ms^-2 m_s2 m_s_2 m_s^2 meterpersecond2 м/с2 m/s² "
+    "meter/second2 meters/second2 metre/second2 metres/second2",
     "g": "g gn gee gravity gforce",
     "mg": "mg millig mgee",
 }
 _RATE = {
     "rad/s": "rad/s rads-1 rads^-1 rad_s rads radps rad/sec rad/second radian/s radians/s rad_sec рад/с",
-    "deg/s": "deg/s dps deg_s degs degps deg/sec deg_sec degree/s degrees/s degree/sec degrees/sec degs-1 grad/s gr/s",
+    "deg/s": "deg/s dps deg_s degs degps deg/sec deg_sec degree/s degrees/s degree/sec degrees/sec degs-1 grad/s gr/s "
+    "degree/second degrees/second",
     "mdeg/s": "mdeg/s mdps mdeg_s",
     "mrad/s": "mrad/s mrad_s mrads",
     "rpm": "rpm u/min 1/min tr/min rev/min r/min min-1",
@@ -89,11 +91,16 @@ _CAPITAL = re.compile(r"^(ts?)(Ms|Us|Ns)$|^(.*[a-z]_?[XYZ])(Dps|Mdps|Rads|Mps2|U
 def _plain(spelling: str) -> str:
     text = unicodedata.normalize("NFKC", spelling).strip()
     text = text.replace("\u2212", "-").replace("\u03bc", "u").replace("\u00b5", "u").replace("\u00b0", "deg")
-    return re.sub(r"[\s\u00b7*\u22c5.^]", "", text)
+    text = re.sub(r"\s+per\s+", "/", re.sub(r"^in\s+(?=\S)", "", text))
+    return re.sub(r"[\s\u00b7*\u22c5.^]", "", text.replace(" squared", "2"))
 
 
 def readings_of(spelling: str) -> list[Reading]:
-    """Return what a spelling may mean, the likeliest first; empty where it is no unit known here."""
+    """Return what a spelling may mean, the likeliest first; empty where it is no unit known here.
+
+    >>> [readings_of(text)[0].unit for text in ("in microteslas", "degrees per second", "meters per second squared")]
+    ['uT', 'deg/s', 'm/s^2']
+    """
     text = _plain(spelling)
     if text in _CASED:
         return _CASED[text]
