@@ -321,9 +321,8 @@ def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _No
     longest = max((after - first for first, after in runs(at_top)), default=0)
     if longest >= SHORTEST and longest * np.log(chance) + np.log(column.size) < np.log(CHANCE):
         return True
-    equal, expected = _equal(column[np.isfinite(column)], top, step)
+    equal, _, often = _often(column[np.isfinite(column)], top, step)
     by_chance = equal * np.log(2.0 * chance / (1.0 + chance))
-    often = equal >= FEWEST and equal > max(DENSER * expected, _most_frequent(column, top, step))
     return noise >= 1.0 and often and by_chance < np.log(CHANCE)
 
 
@@ -332,12 +331,16 @@ def _stands_out(column: FloatArray, top: float, step: float) -> bool:
 
     One that goes on past no limit thins out towards its largest reading: that comes no more often than those below.
     """
-    equal, expected = _equal(column, top, step)
-    if equal < FEWEST or equal <= max(DENSER * expected, _most_frequent(column, top, step)):
-        return False
+    equal, mean, often = _often(column, top, step)
     # how often a Poisson count of this mean comes that often, from above
-    mean = DENSER * expected
-    return bool(equal * (1.0 - np.log(equal / mean)) - mean < np.log(CHANCE))
+    return often and bool(equal * (1.0 - np.log(equal / mean)) - mean < np.log(CHANCE))
+
+
+def _often(column: FloatArray, top: float, step: float) -> tuple[int, float, bool]:
+    """Return how many of readings (n,) are the largest, how many a crest may have, and if they are more than that."""
+    equal, expected = _equal(column, top, step)
+    most = DENSER * expected
+    return equal, most, equal >= FEWEST and equal > max(most, _most_frequent(column, top, step))
 
 
 def _most_frequent(column: FloatArray, top: float, step: float) -> int:

@@ -99,21 +99,28 @@ def predicted(
     else:
         readings = model.reading(state, around)
     limit = sized(values, AccelerometerSaturation).limit_m_s2 if sensor == "accelerometer" else np.inf
+    sized_effects = (
+        (effect, [values.get((effect.id, name), none) for name, none in effect.row.sizes.items()])
+        for effect in effects.called_on(sensor)
+    )
+    acting = [
+        (effect.applied, sizes) for effect, sizes in sized_effects if effect.applied and sizes != list(effect.value)
+    ]
 
     def shown(readings: FloatArray) -> FloatArray:
         """Return readings (..., m, 3) as they are with a limit, and with effects that act on whole readings."""
         readings = np.clip(readings, -limit, limit) if np.isfinite(limit) else readings
-        for effect in effects.called_on(sensor):
-            sizes = [values.get((effect.id, name), none) for name, none in effect.row.sizes.items()]
-            if sizes != list(effect.value) and effect.applied is not None:
-                times = np.broadcast_to(t, rows.shape[:-1]).ravel()
-                flat = _state(times, rows.reshape(-1, rows.shape[-1]))
-                changed = effect.applied.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, flat)
-                readings = changed.reshape(readings.shape)
+        for applied, sizes in acting:
+            times = np.broadcast_to(t, rows.shape[:-1]).ravel()
+            flat = _state(times, rows.reshape(-1, rows.shape[-1]))
+            changed = applied.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, flat)
+            readings = changed.reshape(readings.shape)
         return np.asarray(readings)
 
     if isinstance(model, Accelerometer) and not plant_of(recording).path_known:
-        return _with_lift(model.reading_of(_ALONG_Z), readings, shown, lambda: _felt(recording, values, t))
+        along = model.reading_of(_ALONG_Z)
+        if acting or np.any(along[:2]):
+            return _with_lift(along, readings, shown, lambda: _felt(recording, values, t))
     return shown(readings)
 
 

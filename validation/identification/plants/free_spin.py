@@ -156,11 +156,15 @@ def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     weights = np.where(inside & usable[place], bell, 0.0)
     # where samples are missing, what turns with the spin does not average out
     whole = np.sum(inside & ~usable[place], axis=0) == 0
+    weighed = np.sum(weights, axis=0) > 0.0
+    if not weighed.any() and not one.clipped.any():
+        return []
     weights = weights / np.maximum(np.sum(weights, axis=0), 1e-12)
     good = np.repeat(whole[:, None], 3, axis=1)
     good[:, 2] = False
     t = np.einsum("wn,wn->n", weights, one.t[place])
-    taken = weights[:, whole] if whole.any() else weights
+    # one that stands at its limit throughout keeps its place, to be located there
+    taken = weights[:, whole if whole.any() else weighed] if weighed.any() else weights
     sd = one.sd * float(np.sqrt(np.median(np.sum(taken**2, axis=0))))
     weights[:, 0] *= _trust_in_first(sd[:2])
     values = np.einsum("wn,wnk->nk", weights, np.nan_to_num(one.value)[place])
