@@ -127,6 +127,33 @@ def test_what_the_air_does_tells_a_velocity_that_nothing_else_does(missing):
         assert turned[0] < np.radians(25.0)
 
 
+@pytest.mark.parametrize(("spin_deg_s", "heading_deg"), [(4200.0, 40.0), (-3500.0, -150.0), (2500.0, 110.0)])
+def test_a_flight_that_the_magnetometer_alone_has_read_begins_where_the_air_explains_the_field(spin_deg_s, heading_deg):
+    """How fast and which way a disc flew shows only by what the air does to its axis and its spin.
+
+    Among the few flights that are offered is one from which a fit converges: several explain the field about as well.
+    """
+    motion = flight(spin_deg_s, heading_deg)
+    recording = replace(measured(motion, without=("gps", "accelerometer", "gyroscope")), release=None)
+    offered = list(flight_starts(recording, instants(motion)))
+    apart = [float(np.linalg.norm(one.velocity[0] - motion.velocity[0])) for one in offered]
+    nearest = offered[int(np.argmin(apart))]
+    assert min(apart) < VELOCITY_M_S, apart
+    assert np.max(rotation_error(nearest.attitude, motion.at(nearest.t).attitude)) < ATTITUDE_RAD
+    assert len(offered) <= 5
+
+
+def test_a_stated_velocity_leaves_the_turn_about_the_field_to_the_air():
+    motion = flight()
+    recording = measured(motion, without=("gps", "accelerometer", "gyroscope"))
+    stated = Release(
+        motion.position[0], motion.velocity[0] + [0.5, -0.4, 0.3], sigma={"velocity_ned_m_s": np.full(3, 0.5)}
+    )
+    first = next(flight_starts(replace(recording, release=stated), instants(motion)))
+    assert np.linalg.norm(first.velocity[0] - motion.velocity[0]) < VELOCITY_M_S
+    assert np.max(rotation_error(first.attitude, motion.at(first.t).attitude)) < ATTITUDE_RAD
+
+
 def test_a_tumbling_disc_is_followed_by_its_gyroscope():
     motion = flight(spin_deg_s=-50.0)
     assert_near(flight_initial_states(measured(motion), instants(motion)), motion)

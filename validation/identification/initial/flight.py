@@ -41,6 +41,7 @@ from discsim.validation.identification.initial.path import (
     path_states,
     specific_force_by,
 )
+from discsim.validation.identification.initial.release_from_field import release_from_field
 from discsim.validation.identification.initial.release_from_forces import Told, release_from_forces
 from discsim.validation.identification.initial.smoothing import GRID
 
@@ -80,10 +81,10 @@ def flight_starts(recording: Recording, t: FloatArray) -> Iterator[InitialStates
     """Yield states at instants t (k,) s of a flight, likeliest first; always finite.
 
     Without GPS and track the path is dead reckoning from the stated release, or from what the air does
-    (`release_from_forces`): that alone leaves several to choose from. Without path or
-    accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless the release
-    states it; the others are in ``ambiguous``. With no sensor on board at all, the flight that the baseline predicts
-    from a stated release is the start.
+    (`release_from_forces`, of a magnetometer alone `release_from_field`): that alone leaves several to choose from.
+    Without path or accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless
+    the release states it; the others are in ``ambiguous``. With no sensor on board at all, the flight that the baseline
+    predicts from a stated release is the start.
     """
     t = np.asarray(t, dtype=float)
     if not any(sensor in recording for sensor in ON_BOARD):
@@ -106,6 +107,9 @@ def flight_starts(recording: Recording, t: FloatArray) -> Iterator[InitialStates
     told: tuple[Told, ...] = ()
     if fixes is None and (recording.release is None or recording.release.velocity is None):
         told = release_from_forces(recording, frame, grid, G, force_felt)
+    if fixes is None and force_felt is None and frame.transverse is None:
+        for flown in release_from_field(recording, frame, grid, G, t):
+            yield _finite(InitialStates(t, *flown, ()))
     for start in told or (None,):
         turns = G if start is None else start.turn @ G
         attitude, rate = states_from(recording, frame, grid, turns, t)

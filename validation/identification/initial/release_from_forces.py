@@ -24,7 +24,7 @@ from discsim.validation.identification.initial.attitude import Attitude
 from discsim.validation.identification.initial.path import GUESSED_HEIGHT, SpecificForce, nearest_places
 from discsim.validation.identification.initial.smoothing import smoothed
 
-__all__ = ["MOST", "Told", "release_from_forces"]
+__all__ = ["ELEVATION", "INCIDENCE", "MOST", "SPEED", "TILT", "Told", "release_from_forces"]
 
 #: how long after the first reading the motion is compared, s, how often, and over how long the axis's turning is
 #: smoothed, so that nutation averages out
@@ -33,7 +33,7 @@ _LENGTH, _EVERY, _SMOOTHED = 0.8, 0.05, 0.1
 #: of itself: hidden physics of ordinary size
 _FORCE, _TURNING, _SHARE = 0.7, 0.1, 0.1
 #: ordinary throws: speed m/s, and elevation, tilt of the axis and angle of attack, rad; means with deviations
-_SPEED, _ELEVATION, _TILT, _INCIDENCE = (17.0, 7.0), (0.1, 0.25), (0.0, 0.6), (0.1, 0.3)
+SPEED, ELEVATION, TILT, INCIDENCE = (17.0, 7.0), (0.1, 0.25), (0.0, 0.6), (0.1, 0.3)
 #: what is tried: azimuths and turns about the field in equal parts of a turn, elevations rad, speeds m/s
 _AZIMUTHS, _TURNS = 24, 24
 _ELEVATIONS = np.array([-0.3, -0.1, 0.05, 0.2, 0.4])
@@ -68,8 +68,8 @@ def _costs(
         north, east, down = starts[c, 0], starts[c, 1], starts[c, 2]
         speed = np.sqrt(north**2 + east**2 + down**2)
         tilt = np.arccos(min(max(attitude[0, 2, 2], -1.0), 1.0))
-        cost = ((speed - _SPEED[0]) / _SPEED[1]) ** 2 + ((tilt - _TILT[0]) / _TILT[1]) ** 2
-        cost += ((np.arcsin(-down / speed) - _ELEVATION[0]) / _ELEVATION[1]) ** 2
+        cost = ((speed - SPEED[0]) / SPEED[1]) ** 2 + ((tilt - TILT[0]) / TILT[1]) ** 2
+        cost += ((np.arcsin(-down / speed) - ELEVATION[0]) / ELEVATION[1]) ** 2
         for j in range(attitude.shape[0]):
             A = attitude[j]
             wn, we, wd = wind(p, tables, 0.0, 0.0, 0.0, height)
@@ -79,7 +79,7 @@ def _costs(
             w = A[0, 2] * a + A[1, 2] * b + A[2, 2] * d
             if j == 0:
                 incidence = np.arctan2(w, np.sqrt(u * u + v * v))
-                cost += ((incidence - _INCIDENCE[0]) / _INCIDENCE[1]) ** 2
+                cost += ((incidence - INCIDENCE[0]) / INCIDENCE[1]) ** 2
             P, Q = turning[j, 0], turning[j, 1]
             known = not np.isnan(P)
             X, Y, Z, L, M, _ = air_wrench(p, tables, height, u, v, w, P if known else 0.0, Q if known else 0.0, rate[j])
