@@ -8,7 +8,11 @@ import numpy as np
 from support.made import throws
 
 from discsim.frames import multiply, turn
+from discsim.recording import Recording
+from discsim.sensors import Instruments
+from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.astray import from_other_flights
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of
@@ -44,3 +48,30 @@ def test_a_relaxed_fit_at_its_best_stays():
     found = screened(SearchProblem(recordings, followed=right))
     for mine, given in zip(found.relaxed_fit.trajectories, right.trajectories, strict=True):
         np.testing.assert_array_equal(mine.states, given.states)
+
+
+def read_by_a_magnetometer(seconds: float) -> list[Recording]:
+    """Return two throws of which a magnetometer alone tells: nothing says how fast they flew, and which way."""
+    module = Instruments.from_parts("mpu9250").without("accelerometer", "gyroscope")
+    return [replace(one, release=None) for one in throws(module=module, seconds=seconds)]
+
+
+def test_flights_that_a_magnetometer_alone_has_read_need_no_physics_that_is_not_there():
+    """Among the flights that explain its readings about as well, those are found that explain them fully."""
+    diagnosis = diagnose([read_by_a_magnetometer(4.0)], ["throws"]).diagnosis
+    assert (diagnosis.verdict, diagnosis.effects) == ("consistent", ())
+
+
+def test_a_flight_that_the_baseline_took_for_another_is_begun_anew():
+    """Of two throws the second begins where it flew backwards: it alone changes, and leaves what it left before."""
+    right = screened(SearchProblem(read_by_a_magnetometer(3.0))).base.fit
+    first, second = right.trajectories
+    states, velocity = second.states.copy(), second.plant.layout.velocity
+    states[:, velocity] *= -1.0
+    wrong = replace(right, trajectories=(first, replace(second, states=states)))
+    wrong = replace(wrong, linears=linearised(wrong))
+    wrong = replace(wrong, merit=merit_of(wrong, wrong.linears))
+    assert wrong.merit > 3.0 * right.merit
+    found = from_other_flights(wrong)
+    assert found.merit < 1.02 * right.merit
+    assert from_other_flights(right) is right
