@@ -257,6 +257,29 @@ def degrees_written_as_radians(place: Path, log: Log) -> Path:
     return write_table(place / "log.csv", columns)
 
 
+def codes_of_android_without_names(place: Path, log: Log) -> Path:
+    value = np.stack([log.accel, log.gyro, log.mag], axis=1).reshape(-1, 3)
+    stamps, codes = np.repeat(whole(1e9 * log.t) + 1_700_000_000 * 10**9, 3), np.tile([1, 4, 2], log.t.size)
+    return write_table(place / "log.csv", [("", stamps), ("", codes), *three(XYZ, value)], header=False)
+
+
+def units_behind_commas(place: Path, log: Log) -> Path:
+    columns = [('"time,s"', log.t), *three([f'"Accel {axis.upper()}, g"' for axis in XYZ], log.accel / G0)]
+    return write_table(
+        place / "log.csv", [*columns, *three([f'"Gyro {axis.upper()}, deg/s"' for axis in XYZ], log.gyro / DEG)]
+    )
+
+
+def units_between_bars(place: Path, log: Log) -> Path:
+    """As RaceCapture writes them, with rates under the names of angles."""
+    pulls = [f'"Accel{axis.upper()}"|"G"|-3.0|3.0|25' for axis in XYZ]
+    turns = [f'"{angle}"|"Deg/Sec"|-120|120|25' for angle in ("Roll", "Pitch", "Yaw")]
+    stamps = [('"Interval"|"ms"|0|0|1', whole(1e3 * log.t))]
+    return write_table(
+        place / "log.csv", [*stamps, *three(pulls, log.accel / G0), *three(turns[::-1], log.gyro[:, ::-1] / DEG)]
+    )
+
+
 ALL = ("gyroscope", "accelerometer", "magnetometer")
 SHAPES: dict[Callable[[Path, Log], Path], tuple[str, ...]] = {
     plain_names: ALL,
@@ -286,6 +309,9 @@ SHAPES: dict[Callable[[Path, Log], Path], tuple[str, ...]] = {
     iso_stamps: ALL[:2],
     px4_folder: ALL,
     a_gap_word_and_a_trailing_comma: ("gyroscope", "magnetometer"),
+    codes_of_android_without_names: ALL,
+    units_behind_commas: ALL[:2],
+    units_between_bars: ALL[:2],
 }
 #: What a reading may be off by: rounding as written above (1/2048 g, 0.15 uT, a whole deg/s), and 0.1 % of a scale.
 TOLERANCE = {"gyroscope": 0.6 * DEG + 0.001, "accelerometer": 0.006, "magnetometer": 0.15}

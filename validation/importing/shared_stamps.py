@@ -32,7 +32,7 @@ def evened(time: FloatArray) -> FloatArray:
     are cut off, not rounded, half a step is lost to all rows alike.
 
     >>> evened(np.floor(np.arange(100) / 2.5))[50:54].round(2).tolist()
-    [19.8, 20.2, 20.6, 21.0]
+    [19.6, 20.0, 20.4, 20.8]
     """
     known = np.flatnonzero(np.isfinite(time))
     stamps = time[known]

@@ -116,3 +116,16 @@ def test_a_stated_rate_that_makes_no_round_count_is_a_warning(tmp_path):
     log = import_log(written(tmp_path, 1e-3, "// Sampling rate: 50 Hz\n" + TIMED))
     assert_in_time(log, 0.0)
     assert [note for note in log.notes if "makes 200 rows a second, but" in note]
+
+
+def test_seconds_with_decimals_go_before_a_count_of_ticks(tmp_path):
+    """As DatCon writes the log of a drone: of ticks, four a microsecond, it came out four times as long."""
+    names = [f"IMU_ATTI(0):{sensor}{axis}" for sensor in ("accel", "gyro", "mag") for axis in "XYZ"]
+    cells = np.column_stack([LOG.accel, np.degrees(LOG.gyro), 10.0 * LOG.mag])
+    rows = [
+        ",".join([f"{round(4e6 * t) + 800_000}", f"{t:.6f}", *(f"{cell:.5f}" for cell in row)])
+        for t, row in zip(LOG.t, cells, strict=True)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(["Clock:Tick#", "Clock:offsetTime", *names]), *rows, ""]))
+    assert_in_time(import_log(path), 0.0)

@@ -26,6 +26,8 @@ from discsim.validation.importing.sniffing.names import (
     read_name,
     says_nothing,
     sensor_of,
+    sensor_of_code,
+    sensor_of_file,
 )
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 from discsim.validation.importing.unsigned import signed
@@ -43,7 +45,10 @@ _PLACE = ({"lat", "latitude"}, {"lon", "lng", "long", "longitude"})
 #: a quaternion has turned where one of its numbers has changed by more: by 23 degrees at least
 _TURNED = 0.2
 _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid", "type", "name", "source", "device",
-             "kind", "topic", "imu")  # fmt: skip
+             "kind", "topic", "imu", "sensor_type", "sensortype")  # fmt: skip
+#: share of rows at which a code changes that is one of sensors in turn; and by how much less readings must change from
+#: a code's row to its next than from row to row, in three columns at least: those of one sensor change by as much
+_IN_TURN, _PARTED = 0.2, 0.5
 
 
 @dataclass(frozen=True)
@@ -132,10 +137,30 @@ class Numbers:
             words = all(number(text, self.dialect.layout.decimal) is None for text in few)
             telling = sum(sensor_of(text) is not None for text in few)
             called = name.strip().lower() in _ID_NAMES
-            numbered = called and len(few) > 1 and all(text.isdecimal() for text in few)
-            if (words and (called or telling > 1)) or numbered:
+            numbered = len(few) > 1 and all(text.isdecimal() for text in few)
+            if (words and (called or telling > 1)) or (numbered and (called or self._takes_turns(k))):
                 return k, few
         return None
+
+    def _takes_turns(self, column: int) -> bool:
+        """Tell codes of sensors whose rows come in turn: what stands beside them goes on from a code's row to its next.
+
+        A flag that toggles does not part readings so.
+        """
+        code = self.values[:, column]
+        if not np.isfinite(code).all() or np.mean(np.diff(code) != 0) < _IN_TURN:
+            return False
+        order = np.argsort(code, kind="stable")
+        same = np.diff(code[order]) == 0
+        parted = 0
+        for k in range(len(self.names)):
+            value = self.values[:, k]
+            if k == column or not np.isfinite(value).all() or np.all(np.diff(value) >= 0):
+                continue
+            own = np.abs(np.diff(value[order]))[same]
+            across = np.abs(np.diff(value))[np.diff(code) != 0]
+            parted += bool(np.median(own) < _PARTED * np.median(across))
+        return parted > 2
 
 
 def _is_unit(value: FloatArray) -> bool:
@@ -245,9 +270,9 @@ def _named(
     by_name = sensor_of(name.base)
     source = "its name"
     if by_name is None and where is not None:
-        by_name, source = sensor_of(where[1]), f"the id {where[1]}"
+        by_name, source = _sensor_of_id(numbers, where[1])
     if by_name is None and says_nothing(name.base) and not (units and units[0].sensor != COUNTS):
-        by_name, source = sensor_of(numbers.path.stem), "the file's name"
+        by_name, source = sensor_of_file(numbers.path), "the file's name"
     if by_name in _MAVLINK and not units and all(is_of_mavlink(numbers.names[k]) for k in columns):
         value = numbers.values[:, list(columns)]
         whole = not np.any(value[np.isfinite(value)] % 1)
@@ -269,11 +294,19 @@ def _named(
     return Triple(numbers, columns, name.base, sensor, source, tuple(meant), name.unit, back, where)
 
 
+def _sensor_of_id(numbers: Numbers, text: str) -> tuple[str | None, str]:
+    """Return the sensor that an id of a table speaks of, and what says so."""
+    if (named := sensor_of(text)) is not None:
+        return named, f"the id {text}"
+    codes = () if numbers.ids is None else numbers.ids[1]
+    return sensor_of_code(text, codes), f"Android's number for it, {text},"
+
+
 def _unnamed(numbers: Numbers, free: list[int], where: tuple[str, str] | None) -> list[Triple]:
     """Return neighbouring columns in threes: of a run of them from its first if it comes out even, else from each."""
-    own = sensor_of(where[1]) if where is not None else None
-    file = own or sensor_of(numbers.path.stem)
-    source = f"the id {where[1]}" if where is not None and own else "the file's name" if file else ""
+    own, by_id = (None, "") if where is None else _sensor_of_id(numbers, where[1])
+    file = own or sensor_of_file(numbers.path)
+    source = by_id if own else "the file's name" if file else ""
     runs: list[list[int]] = []
     for k in free:
         if not np.isfinite(numbers.values[:, k]).any():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
@@ -22,6 +24,8 @@ __all__ = [
     "read_name",
     "says_nothing",
     "sensor_of",
+    "sensor_of_code",
+    "sensor_of_file",
     "timeless",
     "words_of",
 ]
@@ -55,11 +59,16 @@ _LETTERS = {
     "gf": "accelerometer",
     "g": "gyroscope",
     "w": "gyroscope",
+    "om": "gyroscope",
     "ω": "gyroscope",
     "m": "magnetometer",
     "b": "magnetometer",
     "h": "magnetometer",
 }
+#: Sensors by their number in Android (Sensor.TYPE_GYROSCOPE is 4), those that two of the codes of a log must be of, and
+#: the last that is counted.
+_ANDROID = {"1": "accelerometer", "2": "magnetometer", "4": "gyroscope"}
+_ANDROID_TOLD, _LAST_OF_ANDROID = frozenset(_ANDROID), 42
 #: Words before a g that is none of a gyroscope: high_g_x is an accelerometer's of wide range.
 _RANGES = ("high", "low")
 #: A column that stands this far back is no sensor's reading.
@@ -129,6 +138,9 @@ def foreign_words(text: str) -> int:
 #: The rates about a body's axes as flight mechanics and inertial units call them, and the axis of each.
 _RATES = {"p": 0, "q": 1, "r": 2, "rollrate": 0, "pitchrate": 1, "yawrate": 2, "ratex": 0, "ratey": 1, "ratez": 2}
 
+#: Angles, which are rates where their unit says so (Yaw in deg/s).
+_ANGLES = {"roll": 0, "pitch": 1, "yaw": 2}
+
 
 def _without_axis(name: str) -> tuple[str, int | None]:
     """Return a name without its axis, and the axis: x, y, z (0, 1, 2 in brackets) at the end, in front or between."""
@@ -157,6 +169,8 @@ def read_name(name: str) -> Name:
     """
     rest, unit = split_unit(name.strip())
     if (axis := _RATES.get(re.sub(r"[\s_\-]+", "", rest.lower()))) is not None:
+        return Name("rotrate", axis, unit)
+    if (axis := _ANGLES.get(rest.lower())) is not None and any(r.sensor == "gyroscope" for r in readings_of(unit)):
         return Name("rotrate", axis, unit)
     base, axis = _without_axis(rest)
     base = base.rstrip(" /")
@@ -213,6 +227,41 @@ def sensor_of(base: str) -> str | None:
     letter = re.sub(r"\d+$", "", words[-1])
     if letter in _LETTERS and not (letter == "g" and words[:-1] and words[-2] in _RANGES):
         return _LETTERS[letter]
+    return _by_stem(words)
+
+
+def sensor_of_file(path: Path) -> str | None:
+    """Return the sensor that a file's name speaks of, or None.
+
+    A letter behind other words counts the files (throw_a, throw_b), but where one of them is a gyroscope's (run_a,
+    run_g) and none is called by a letter that no sensor has.
+
+    >>> [sensor_of_file(Path(stem)) for stem in ("run_gyr", "throw_a", "a", "acc_2")]
+    ['gyroscope', None, 'accelerometer', 'accelerometer']
+    """
+    words = re.split(r"[\s_\-.]+", _plain(path.stem))
+    if len(words) > 1 and len(words[-1]) == 1:
+        besides = [path.with_name(f"{path.stem[:-1]}{letter}{path.suffix}").exists() for letter in "gc"]
+        if besides != [True, False]:
+            return _by_stem(words)
+    return sensor_of(path.stem)
+
+
+def sensor_of_code(text: str, codes: Collection[str]) -> str | None:
+    """Return the sensor that a number in a column of such ``codes`` stands for, or None where they are no Android's.
+
+    >>> sensor_of_code("4", ("1", "4", "2")), sensor_of_code("1", ("1", "2")), sensor_of_code("4", ("4", "1", "77"))
+    ('gyroscope', None, None)
+    """
+    known = len(_ANDROID_TOLD.intersection(codes)) > 1 and "4" in codes and all(map(_is_of_android, codes))
+    return _ANDROID.get(text) if known else None
+
+
+def _is_of_android(code: str) -> bool:
+    return code.isdecimal() and 1 <= int(code) <= _LAST_OF_ANDROID
+
+
+def _by_stem(words: Sequence[str]) -> str | None:
     squeezed = "".join(words).replace("magnitude", "")
     return next((sensor for sensor, stems in _PLAIN_STEMS.items() if any(stem in squeezed for stem in stems)), None)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from discsim.errors import InputError
 from discsim.validation.importing.sniffing.archive import MAX_FILES
 from discsim.validation.importing.sniffing.dialect import dialect_of
-from discsim.validation.importing.sniffing.names import read_name, sensor_of
+from discsim.validation.importing.sniffing.names import read_name, sensor_of, sensor_of_file
 
 __all__ = ["listed", "several_logs"]
 
@@ -38,7 +38,7 @@ def several_logs(raw: Path) -> list[Path]:
         if len(kinds) > 1 or not _sensors(names):
             return []
     one_sensor = all(len(_sensors(names)) == 1 for names in kinds)
-    per_sensor = one_sensor and all(sensor_of(path.stem) for path in tables)
+    per_sensor = one_sensor and all(sensor_of_file(path) for path in tables)
     return [] if len(tables) < 2 or per_sensor else tables
 
 

@@ -35,7 +35,7 @@ _RATE = {
     "Hz": "hz rev/s rps u/s turns/s",
 }
 _FIELD = {
-    "uT": "ut microtesla microteslas utesla мкт мктл",
+    "uT": "ut microt microtesla microteslas utesla мкт мктл",
     "nT": "nt nanotesla",
     "mT": "millitesla",
     "gauss": "gauss gs ga g",
@@ -84,6 +84,8 @@ _TIME = {spelling: unit for unit, spellings in _TIME_SPELLINGS.items() for spell
 #: A unit in brackets at the end, or behind a slash as German textbooks write it ("t / s").
 _BRACKETED = re.compile(r"^(.*?)[\s_]*[(\[{<]\s*([^()\[\]{}<>]*[^\W\d_][^()\[\]{}<>]*|[°%])\s*[)\]}>]\s*(.*)$")
 _SLASHED = re.compile(r"^(.*?)\s+/\s*(\S+)$")
+#: A unit behind a comma (Gyro X, deg/s) or between bars (AccelX|"G"|-3.0|3.0|25), as RaceCapture writes it.
+_BEHIND = re.compile(r"^(.*\S)\s*,\s*([^,]+)$|^\"?([^|\"]+)\"?\|\s*\"?([^|\"]*)\"?\s*(?:\|.*)?$")
 #: A unit that only its capital parts from a letter for time or for an axis (tsMs, gyroXDps).
 _CAPITAL = re.compile(r"^(ts?)(Ms|Us|Ns)$|^(.*[a-z]_?[XYZ])(Dps|Mdps|Rads|Mps2|UT|Gauss|Mgauss|Mg)$")
 
@@ -112,10 +114,13 @@ def readings_of(spelling: str) -> list[Reading]:
 def split_unit(name: str) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit (empty where there is none).
 
-    Units stand in brackets, behind a slash with a blank before it, or as the last words after underscores or blanks.
+    Units stand in brackets, behind a slash with a blank before it, behind a comma, between bars, or as the last words
+    after underscores or blanks.
 
     >>> split_unit("gyro_x [deg/s]"), split_unit("tsMs"), split_unit("gyroXDps")
     (('gyro_x', 'deg/s'), ('ts', 'Ms'), ('gyroX', 'Dps'))
+    >>> split_unit("Gyro X, deg/s"), split_unit('AccelX|"G"|-3.0|3.0|25')
+    (('Gyro X', 'deg/s'), ('AccelX', 'G'))
     >>> split_unit("velMs"), split_unit("status"), split_unit("accX")
     (('velMs', ''), ('status', ''), ('accX', ''))
     """
@@ -125,6 +130,10 @@ def split_unit(name: str) -> tuple[str, str]:
     slashed = _SLASHED.match(name)
     if slashed and readings_of(slashed[2]):
         return slashed[1].strip(), slashed[2]
+    if behind := _BEHIND.match(name):
+        base, unit = behind[1] or behind[3], behind[2] or behind[4]
+        if behind[3] or readings_of(unit):
+            return base.strip(), unit.strip()
     for gap in list(re.finditer(r"[_\s-]+", name))[-3:]:  # m_s_2 is the longest
         if gap.start() and readings_of(name[gap.end() :]):
             return name[: gap.start()], name[gap.end() :]
