@@ -41,6 +41,10 @@ _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct",
 _NO_YEAR = "2000"
 #: A date as spreadsheets and phones write it, and the time behind it: 01.06.2025, 6/1/2025 or 2025/6/1.
 _DATE = re.compile(r"(?:(\d{4})[-./](\d{1,2})[-./](\d{1,2})|(\d{1,2})[-./](\d{1,2})[-./](\d{4}|\d{2}))[T,\s]\s*(\d.*)")
+#: A time of day before its date: 11:47:22 07/04/2014.
+_TIME_FIRST = re.compile(
+    r"(\d{1,2}:\d{2}:\d{2}[.,:\d]*?(?:\s*[AaPp]\.?[Mm]\.?)?)(?:,\s*|\s+)(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})"
+)
 #: A date and time of digits alone, or parted by dashes as the names of files are: 20211222_210946_210.
 _DIGITS = re.compile(
     r"((?:19|20)\d{2})[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])[-_T\s]?"
@@ -63,12 +67,14 @@ def iso_seconds(cell: str) -> float | None:
     (60.5, 43200.123, 60.5)
     >>> iso_seconds("Sat Jan  1 00:01:00 2000"), iso_seconds("Jan 1, 2000 @ 00:01:00"), iso_seconds("20000101000100500")
     (60.0, 60.0, 60.5)
-    >>> iso_seconds("2000-1-1--0-1-0-25")
-    60.025
+    >>> iso_seconds("2000-1-1--0-1-0-25"), iso_seconds("00:01:00.5 01/01/2000"), iso_seconds("0:01:00 AM, 2000-01-01")
+    (60.025, 60.5, 60.0)
     """
     text = cell.strip().strip('"')
     if _TIME_OF_DAY.fullmatch(text):
         return _time_of_day(text)
+    if first := _TIME_FIRST.fullmatch(text):
+        text = f"{first[2]} {first[1]}"
     if minutes := _MINUTES.fullmatch(text):
         return 60.0 * int(minutes[1]) + float(f"{minutes[2]}.{minutes[3]}") if int(minutes[2]) < 60 else None
     if days := _DAYS.fullmatch(text):
