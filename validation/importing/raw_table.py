@@ -122,7 +122,8 @@ class Layout:
         if (begun := stamped(line)) is not None:
             line = f"{begun[1]}{' ' if self.separator == 'blank' else self.separator}{begun[2]}"
         if self.separator == "blank":
-            return line.split()
+            parted = line.split()
+            return [item for cell in parted for item in _spread(cell)] if self.lists and _closed(line) else parted
         try:
             cells = next(csv.reader([line], delimiter=self.separator, skipinitialspace=True), [])
         except csv.Error:

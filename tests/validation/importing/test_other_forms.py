@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import pickle
 import sqlite3
+import tarfile
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -86,6 +88,18 @@ def in_a_structure() -> dict[str, object]:
     return {"log": {"time": LOG.t, "imu": {name: value.T for name, value in SENSORS.items()}}, "note": "backhand"}
 
 
+def packed(path: Path) -> None:
+    lines = [",".join(HEADER), *(",".join(map(str, row)) for row in ROWS), ""]
+    path.write_bytes(gzip.compress("\n".join(lines).encode()))
+
+
+def printed_arrays(path: Path) -> None:
+    """As numpy prints them, with blanks between numbers, under a name for seconds of the minute."""
+    lines = ["second acc[g] gyro[deg/s] mag[uT]"]
+    lines += [f"{ms / 1000:.3f} [{a} {b} {c}] [ {d} {e} {f}] [{g} {h} {i} ]" for ms, a, b, c, d, e, f, g, h, i in ROWS]
+    path.write_text("\n".join([*lines, ""]))
+
+
 FORMS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "MATLAB": ("log.mat", lambda path: savemat(path, ARRAYS)),
     "MATLAB, a structure with axes in rows": ("log.mat", lambda path: savemat(path, in_a_structure())),
@@ -103,6 +117,9 @@ FORMS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "apostrophes": ("log.csv", quoted("'", "")),
     "quoted by apostrophes": ("log.txt", quoted("'", "'", "\t")),
     "a web page": ("log.html", a_page),
+    "gzip": ("log.csv.gz", packed),
+    "gzip without its ending": ("log.csv", packed),
+    "arrays as they are printed": ("log.txt", printed_arrays),
     "units with a degree sign": ("log.csv", with_units(" ", ";", "cp1252")),
 }
 
@@ -212,3 +229,14 @@ def test_units_in_cells_are_moved_whatever_ends_a_line(tmp_path, end):
     raw = tmp_path / "log.csv"
     raw.write_bytes(raw.read_bytes().replace(b"\n", end.encode()))
     assert_allclose(import_log(raw).recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-3 * DEG)
+
+
+def test_a_gzip_that_is_cut_and_one_of_many_files_are_refused(tmp_path):
+    packed(tmp_path / "log.csv.gz")
+    (tmp_path / "cut.csv.gz").write_bytes((tmp_path / "log.csv.gz").read_bytes()[:3000])
+    with tarfile.open(tmp_path / "logs.tar.gz", "w:gz") as archive:
+        archive.add(tmp_path / "log.csv.gz", "log.csv.gz")
+    with pytest.raises(InputError, match=r"cut\.csv\.gz: cannot be unpacked .*expected a whole file of gzip"):
+        import_log(tmp_path / "cut.csv.gz")
+    with pytest.raises(InputError, match=r"logs\.tar\.gz: is a tar archive in gzip; unpack it first"):
+        import_log(tmp_path / "logs.tar.gz")

@@ -1,18 +1,21 @@
-"""A raw file, folder, zip or log of messages as files of text. Takes a path; gives one that can be read."""
+"""A raw file, folder, zip, gzip or log of messages as files of text. Takes a path; gives one that can be read."""
 
 from __future__ import annotations
 
+import gzip
 import lzma
 import re
 import shutil
 import stat
 import struct
+import tarfile
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import IO
 
 from discsim.errors import InputError
 from discsim.files import endless
@@ -42,6 +45,8 @@ BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|htm
 def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterator[Path]:
     """Give ``raw`` itself, or a folder of that name with the files of a zip or a log's tables, gone afterwards.
 
+    A file of gzip stands there without its ending.
+
     In a folder a receiver's track (NMEA, GPX) becomes a table under its own name beside the other files; so does what
     is JSON, there and by itself. ``say`` is told what was left out of a log of messages, and of JSON. Raises
     `InputError` for no such file, a damaged zip, one with a password, one with paths that lead out of it or links, one
@@ -53,7 +58,9 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
         raise InputError.at(raw, None, "is a device or a pipe; expected a file or folder that a logger wrote")
     with tempfile.TemporaryDirectory(prefix="discsim-") as place:
         logged = raw
-        if raw.is_file() and raw.suffix.lower() == ".zip":
+        if raw.is_file() and _is_gzip(raw):
+            logged = _gunzip(raw, Path(place))
+        elif raw.is_file() and raw.suffix.lower() == ".zip":
             folder = Path(place) / raw.stem
             folder.mkdir()
             _unpack(raw, folder)
@@ -138,13 +145,37 @@ def _linked(source: Path, target: Path) -> None:
         shutil.copytree(source, target) if source.is_dir() else shutil.copy2(source, target)
 
 
+def _is_gzip(raw: Path) -> bool:
+    with raw.open("rb") as file:
+        return file.read(2) == b"\x1f\x8b"
+
+
+def _gunzip(raw: Path, place: Path) -> Path:
+    """Unpack a file of gzip, as pandas and loggers write it, under its own name without the ending."""
+    target = place / (raw.stem if raw.suffix.lower() in (".gz", ".gzip") else raw.name)
+    try:
+        with gzip.open(raw) as source:
+            _written(raw, source, target, _most(raw))
+    except _DAMAGED as error:
+        what = str(error) or type(error).__name__
+        raise InputError.at(raw, None, f"cannot be unpacked ({what}); expected a whole file of gzip") from None
+    if tarfile.is_tarfile(target):
+        raise InputError.at(raw, None, "is a tar archive in gzip; unpack it first; expected a file or folder of a log")
+    return target
+
+
+def _most(raw: Path) -> int:
+    """Return how many bytes an archive may unpack to."""
+    return min(MAX_BYTES, MAX_RATIO * max(raw.stat().st_size, 1 << 10))
+
+
 def _unpack(raw: Path, folder: Path) -> None:
     try:
         with zipfile.ZipFile(raw) as archive:
             members = [member for member in archive.infolist() if not member.is_dir()]
             if len(members) > MAX_FILES:
                 raise InputError.at(raw, None, f"holds {len(members)} files; expected at most {MAX_FILES}")
-            left = min(MAX_BYTES, MAX_RATIO * max(raw.stat().st_size, 1 << 10))
+            left = _most(raw)
             for member in members:
                 target = folder / _checked(raw, member)
                 target.parent.mkdir(parents=True, exist_ok=True)
@@ -167,9 +198,15 @@ def _checked(raw: Path, member: zipfile.ZipInfo) -> PurePosixPath:
 
 
 def _copy(raw: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path, left: int) -> int:
-    """Unpack one file, counting the bytes that come: what the archive says of its size may be wrong."""
+    """Unpack one file of a zip."""
+    with archive.open(member) as source:
+        return _written(raw, source, target, left)
+
+
+def _written(raw: Path, source: IO[bytes] | gzip.GzipFile, target: Path, left: int) -> int:
+    """Write what is unpacked, counting the bytes that come: what the archive says of its size may be wrong."""
     written = 0
-    with archive.open(member) as source, target.open("wb") as sink:
+    with target.open("wb") as sink:
         while chunk := source.read(_CHUNK):
             written += len(chunk)
             if written > left:

@@ -43,7 +43,7 @@ class Name(NamedTuple):
 _STEMS = {
     "gyroscope": (
         "gyr giro ziro zyro jiro гиро ジャイロ 陀螺 자이로 omega rotationrate rotrate angularvel angvel angularrate "
-        "rotationvel rotationalvel "
+        "rotationvel rotationalvel rotvel "
         "winkelgeschw drehrate vitesseangulaire vitessederotation velocidadangular velocitaangolare 각속도 角速度"
     ),
     "magnetometer": "mag compass kompass boussole bussola магн 磁 자기 manyetik hmc58 qmc58 lis3m mmc5 ak8963",
@@ -102,7 +102,7 @@ _SPACINGS = (
 )
 #: Words for time beside the name of a sensor.
 _TIME_WORDS = ("t", "ts")
-_TIME_NAMES = "t ts ms us ns sec secs s msec usec tms tus"
+_TIME_NAMES = "t ts ms us ns sec secs second s msec usec tms tus"
 #: Words of a name: GPS TOW, iTOW (time of week), UTC_Nano.
 _OF_TIME = {"tow", "utc"}
 
