@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import json
+import pkgutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -64,6 +65,19 @@ def test_the_examples_of_the_docstrings_give_what_they_say(module, recording, tm
     found = doctest.testmod(import_module(module), extraglobs={"recording": recording})
     assert found.attempted > 0
     assert found.failed == 0
+
+
+def test_the_examples_of_all_other_docstrings_give_what_they_say():
+    """But for the engine's, which needs a disc at hand."""
+    run, wrong = 0, []
+    for module in pkgutil.walk_packages(discsim.__path__, "discsim."):
+        if module.name in {*EXAMPLES, "discsim.validation", "discsim.engine"} or module.name.endswith("__main__"):
+            continue
+        found = doctest.testmod(import_module(module.name))
+        run += found.attempted
+        wrong += [module.name] * (found.failed > 0)
+    assert wrong == []
+    assert run > 50
 
 
 @pytest.mark.parametrize("package", [discsim, validation])

@@ -122,14 +122,16 @@ class Layout:
         if (begun := stamped(line)) is not None:
             line = f"{begun[1]}{' ' if self.separator == 'blank' else self.separator}{begun[2]}"
         if self.separator == "blank":
-            parted = line.split()
-            return [item for cell in parted for item in _spread(cell)] if self.lists and _closed(line) else parted
-        try:
-            cells = next(csv.reader([line], delimiter=self.separator, skipinitialspace=True), [])
-        except csv.Error:
-            return [line]
-        if self.lists:
-            cells = [item for cell in cells for item in (_spread(cell) if _closed(line) else [cell])]
+            cells = line.split()
+        else:
+            try:
+                cells = next(csv.reader([line], delimiter=self.separator, skipinitialspace=True), [])
+            except csv.Error:
+                return [line]
+        if self.lists and _closed(line):
+            cells = [item for cell in cells for item in _spread(cell)]
+        if self.separator == "blank":
+            return cells
         cells = [cell.strip() for cell in cells]
         return [self._ungrouped(cell) for cell in cells] if self.thousands else cells
 

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, RELEASE, made_log, three, write_table
 
+from discsim.recording import Samples
 from discsim.validation.importing.imported_log import import_log
 
 LOG = made_log()
+
+
+def assert_as_made(read: Mapping[str, Samples]) -> None:
+    assert_allclose(np.abs(read["gyroscope"].value), np.abs(LOG.gyro), atol=1e-5)
+    assert_allclose(np.abs(read["accelerometer"].value), np.abs(LOG.accel), atol=1e-4)
+    assert_allclose(np.abs(read["magnetometer"].value), np.abs(LOG.mag), atol=1e-4)
 
 
 def test_sensors_that_are_numbers_are_not_mixed(tmp_path):
@@ -17,9 +26,7 @@ def test_sensors_that_are_numbers_are_not_mixed(tmp_path):
     value = np.stack([LOG.gyro / DEG, LOG.accel / G0, LOG.mag], axis=1).reshape(-1, 3)
     columns = [("sensor", np.tile([1, 2, 3], LOG.t.size)), ("ms", np.repeat(LOG.t * 1000, 3))]
     read = import_log(write_table(tmp_path / "log.csv", columns + three(["x", "y", "z"], value))).recordings[0].samples
-    assert_allclose(np.abs(read["gyroscope"].value), np.abs(LOG.gyro), atol=1e-5)
-    assert_allclose(np.abs(read["accelerometer"].value), np.abs(LOG.accel), atol=1e-4)
-    assert_allclose(np.abs(read["magnetometer"].value), np.abs(LOG.mag), atol=1e-4)
+    assert_as_made(read)
 
 
 @pytest.mark.parametrize("name", ["t_us", "time"])
@@ -46,9 +53,7 @@ def test_codes_under_an_unknown_name_part_rows_that_go_on_from_one_to_the_next(t
     columns = [("t_ms", np.repeat(LOG.t * 1000, 3)), ("src", np.tile([7, 8, 9], LOG.t.size))]
     log = write_table(tmp_path / "log.csv", columns + three(["x", "y", "z"], value), header=header)
     read = import_log(log).recordings[0].samples
-    assert_allclose(np.abs(read["gyroscope"].value), np.abs(LOG.gyro), atol=1e-5)
-    assert_allclose(np.abs(read["accelerometer"].value), np.abs(LOG.accel), atol=1e-4)
-    assert_allclose(np.abs(read["magnetometer"].value), np.abs(LOG.mag), atol=1e-4)
+    assert_as_made(read)
 
 
 @pytest.mark.parametrize("header", [True, False])
@@ -72,6 +77,4 @@ def test_letters_of_sensors_are_theirs(tmp_path):
     for letter, value in (("g", LOG.gyro / DEG), ("a", LOG.accel), ("m", LOG.mag)):
         write_table(tmp_path / f"throw_{letter}.csv", [("t_s", LOG.t), *three(["x", "y", "z"], value)])
     read = import_log(tmp_path).recordings[0].samples
-    assert_allclose(np.abs(read["gyroscope"].value), np.abs(LOG.gyro), atol=1e-5)
-    assert_allclose(np.abs(read["accelerometer"].value), np.abs(LOG.accel), atol=1e-4)
-    assert_allclose(np.abs(read["magnetometer"].value), np.abs(LOG.mag), atol=1e-4)
+    assert_as_made(read)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
 import pickle
 import sqlite3
@@ -240,3 +241,17 @@ def test_a_gzip_that_is_cut_and_one_of_many_files_are_refused(tmp_path):
         import_log(tmp_path / "cut.csv.gz")
     with pytest.raises(InputError, match=r"logs\.tar\.gz: is a tar archive in gzip; unpack it first"):
         import_log(tmp_path / "logs.tar.gz")
+
+
+def test_a_file_that_may_not_be_read_is_told(tmp_path, monkeypatch):
+    raw, as_before = tmp_path / "log.csv", Path.open
+    packed(raw)
+
+    def refused(path: Path, *how: object, **more: object) -> object:
+        if path == raw:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return as_before(path, *how, **more)
+
+    monkeypatch.setattr(Path, "open", refused)
+    with pytest.raises(InputError, match=r"log\.csv: cannot be read \(Permission denied\)"):
+        import_log(tmp_path / "log.csv")

@@ -21,6 +21,7 @@ from discsim.errors import InputError
 from discsim.files import endless
 from discsim.validation.importing.logs import kind_of, write_tables
 from discsim.validation.importing.sniffing.other_forms import writer_of
+from discsim.validation.importing.sniffing.other_forms.written import first_bytes
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
 
@@ -31,6 +32,7 @@ MAX_BYTES = 4 << 30
 #: ... and this many bytes for each packed one: numbers shrink by 3 to 20, a constant column by some hundreds.
 MAX_RATIO = 1000
 _CHUNK = 1 << 20
+_GZIP = b"\x1f\x8b"
 #: What damage makes of a zip: errors of the system, of zipfile, and of the libraries that unpack it. zipfile takes
 #: numbers and texts of the archive for sound and fails on them as any code does.
 _DAMAGED = (
@@ -45,12 +47,10 @@ BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|htm
 def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterator[Path]:
     """Give ``raw`` itself, or a folder of that name with the files of a zip or a log's tables, gone afterwards.
 
-    A file of gzip stands there without its ending.
-
-    In a folder a receiver's track (NMEA, GPX) becomes a table under its own name beside the other files; so does what
-    is JSON, there and by itself. ``say`` is told what was left out of a log of messages, and of JSON. Raises
-    `InputError` for no such file, a damaged zip, one with a password, one with paths that lead out of it or links, one
-    above the limits, a log that cannot be read.
+    What is in gzip stands there without that ending. In a folder a receiver's track (NMEA, GPX) becomes a table under
+    its own name beside the other files; so does what is JSON, there and by itself. ``say`` is told what was left out of
+    a log of messages, and of JSON. Raises `InputError` for no such file, a damaged zip or gzip, one with a password,
+    one with paths that lead out of it or links, one above the limits, a log that cannot be read.
     """
     if not raw.exists():
         raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
@@ -58,7 +58,7 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
         raise InputError.at(raw, None, "is a device or a pipe; expected a file or folder that a logger wrote")
     with tempfile.TemporaryDirectory(prefix="discsim-") as place:
         logged = raw
-        if raw.is_file() and _is_gzip(raw):
+        if raw.is_file() and first_bytes(raw, len(_GZIP)) == _GZIP:
             logged = _gunzip(raw, Path(place))
         elif raw.is_file() and raw.suffix.lower() == ".zip":
             folder = Path(place) / raw.stem
@@ -145,11 +145,6 @@ def _linked(source: Path, target: Path) -> None:
         shutil.copytree(source, target) if source.is_dir() else shutil.copy2(source, target)
 
 
-def _is_gzip(raw: Path) -> bool:
-    with raw.open("rb") as file:
-        return file.read(2) == b"\x1f\x8b"
-
-
 def _gunzip(raw: Path, place: Path) -> Path:
     """Unpack a file of gzip, as pandas and loggers write it, under its own name without the ending."""
     target = place / (raw.stem if raw.suffix.lower() in (".gz", ".gzip") else raw.name)
@@ -157,8 +152,7 @@ def _gunzip(raw: Path, place: Path) -> Path:
         with gzip.open(raw) as source:
             _written(raw, source, target, _most(raw))
     except _DAMAGED as error:
-        what = str(error) or type(error).__name__
-        raise InputError.at(raw, None, f"cannot be unpacked ({what}); expected a whole file of gzip") from None
+        raise _damaged(raw, error, "a whole file of gzip") from None
     if tarfile.is_tarfile(target):
         raise InputError.at(raw, None, "is a tar archive in gzip; unpack it first; expected a file or folder of a log")
     return target
@@ -181,10 +175,14 @@ def _unpack(raw: Path, folder: Path) -> None:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 left -= _copy(raw, archive, member, target, left)
     except _DAMAGED as error:
-        what = str(error) or type(error).__name__
-        raise InputError.at(raw, None, f"cannot be unpacked ({what}); expected a whole zip archive") from None
+        raise _damaged(raw, error, "a whole zip archive") from None
     except RuntimeError as error:  # zipfile's word for a password
-        raise InputError.at(raw, None, f"cannot be unpacked ({error}); expected a zip without a password") from None
+        raise _damaged(raw, error, "a zip without a password") from None
+
+
+def _damaged(raw: Path, error: Exception, expected: str) -> InputError:
+    what = str(error) or type(error).__name__
+    return InputError.at(raw, None, f"cannot be unpacked ({what}); expected {expected}")
 
 
 def _checked(raw: Path, member: zipfile.ZipInfo) -> PurePosixPath:

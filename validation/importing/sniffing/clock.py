@@ -193,8 +193,8 @@ def _rank(numbers: Numbers, k: int, clock: Clock) -> float:
     """Return how far a column stands back; one of a message's header is when it was measured, not when it came."""
     named = is_time_name(numbers.names[k])
     measured = {"header", "stamp"} <= words_of(numbers.names[k])
-    place = not named and _is_place(numbers.values[:, k])
     value = numbers.values[:, k]
+    place = not named and _is_place(value)
     # a count whose worth is guessed stands behind seconds with decimals
     guessed = clock.unit != "iso" and clock.decision.sure == "likely" and not np.any(value[np.isfinite(value)] % 1)
     sure = {"certain": 0, "likely": 1, "guess": 2}[clock.decision.sure]

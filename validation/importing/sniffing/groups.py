@@ -148,7 +148,8 @@ class Numbers:
         A flag that toggles does not part readings so.
         """
         code = self.values[:, column]
-        if not np.isfinite(code).all() or np.mean(np.diff(code) != 0) < _IN_TURN:
+        changes = np.diff(code) != 0
+        if not np.isfinite(code).all() or np.mean(changes) < _IN_TURN:
             return False
         order = np.argsort(code, kind="stable")
         same = np.diff(code[order]) == 0
@@ -158,7 +159,7 @@ class Numbers:
             if k == column or not np.isfinite(value).all() or np.all(np.diff(value) >= 0):
                 continue
             own = np.abs(np.diff(value[order]))[same]
-            across = np.abs(np.diff(value))[np.diff(code) != 0]
+            across = np.abs(np.diff(value))[changes]
             parted += bool(np.median(own) < _PARTED * np.median(across))
         return parted > 2
 

@@ -65,10 +65,9 @@ _LETTERS = {
     "b": "magnetometer",
     "h": "magnetometer",
 }
-#: Sensors by their number in Android (Sensor.TYPE_GYROSCOPE is 4), those that two of the codes of a log must be of, and
-#: the last that is counted.
+#: Sensors by their number in Android (Sensor.TYPE_GYROSCOPE is 4), and the last that is counted.
 _ANDROID = {"1": "accelerometer", "2": "magnetometer", "4": "gyroscope"}
-_ANDROID_TOLD, _LAST_OF_ANDROID = frozenset(_ANDROID), 42
+_LAST_OF_ANDROID = 42
 #: Words before a g that is none of a gyroscope: high_g_x is an accelerometer's of wide range.
 _RANGES = ("high", "low")
 #: A column that stands this far back is no sensor's reading.
@@ -223,7 +222,7 @@ def _split(name: str) -> list[str]:
 
 def sensor_of(base: str) -> str | None:
     """Return the sensor that a name (of a column without axis and unit, of a file, of an id) speaks of, or None."""
-    words = re.split(r"[\s_\-.]+", _plain(base))
+    words = _parts(base)
     letter = re.sub(r"\d+$", "", words[-1])
     if letter in _LETTERS and not (letter == "g" and words[:-1] and words[-2] in _RANGES):
         return _LETTERS[letter]
@@ -239,7 +238,7 @@ def sensor_of_file(path: Path) -> str | None:
     >>> [sensor_of_file(Path(stem)) for stem in ("run_gyr", "throw_a", "a", "acc_2")]
     ['gyroscope', None, 'accelerometer', 'accelerometer']
     """
-    words = re.split(r"[\s_\-.]+", _plain(path.stem))
+    words = _parts(path.stem)
     if len(words) > 1 and len(words[-1]) == 1:
         besides = [path.with_name(f"{path.stem[:-1]}{letter}{path.suffix}").exists() for letter in "gc"]
         if besides != [True, False]:
@@ -253,12 +252,14 @@ def sensor_of_code(text: str, codes: Collection[str]) -> str | None:
     >>> sensor_of_code("4", ("1", "4", "2")), sensor_of_code("1", ("1", "2")), sensor_of_code("4", ("4", "1", "77"))
     ('gyroscope', None, None)
     """
-    known = len(_ANDROID_TOLD.intersection(codes)) > 1 and "4" in codes and all(map(_is_of_android, codes))
+    counted = all(code.isdecimal() and 1 <= int(code) <= _LAST_OF_ANDROID for code in codes)
+    known = counted and "4" in codes and len(_ANDROID.keys() & codes) > 1
     return _ANDROID.get(text) if known else None
 
 
-def _is_of_android(code: str) -> bool:
-    return code.isdecimal() and 1 <= int(code) <= _LAST_OF_ANDROID
+def _parts(name: str) -> list[str]:
+    """Return a name's words as they are after `_plain`."""
+    return re.split(r"[\s_\-.]+", _plain(name))
 
 
 def _by_stem(words: Sequence[str]) -> str | None:
@@ -301,7 +302,7 @@ def timeless(name: str) -> str:
     >>> timeless("mag_timestamp_us"), timeless("t_gyro"), timeless("time"), timeless("gyro_x")
     ('mag', 'gyro', '', '')
     """
-    words = re.split(r"[\s_\-.]+", _plain(split_unit(name.strip())[0]))
+    words = _parts(split_unit(name.strip())[0])
     left = [word for word in words if word not in _TIME_WORDS]
     for stem in sorted(_PLAIN_TIME_STEMS, key=len, reverse=True):
         left = [word.replace(stem, "") for word in left]

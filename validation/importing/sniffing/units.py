@@ -84,8 +84,9 @@ _TIME = {spelling: unit for unit, spellings in _TIME_SPELLINGS.items() for spell
 #: A unit in brackets at the end, or behind a slash as German textbooks write it ("t / s").
 _BRACKETED = re.compile(r"^(.*?)[\s_]*[(\[{<]\s*([^()\[\]{}<>]*[^\W\d_][^()\[\]{}<>]*|[°%])\s*[)\]}>]\s*(.*)$")
 _SLASHED = re.compile(r"^(.*?)\s+/\s*(\S+)$")
-#: A unit behind a comma (Gyro X, deg/s) or between bars (AccelX|"G"|-3.0|3.0|25), as RaceCapture writes it.
-_BEHIND = re.compile(r"^(.*\S)\s*,\s*([^,]+)$|^\"?([^|\"]+)\"?\|\s*\"?([^|\"]*)\"?\s*(?:\|.*)?$")
+#: A unit behind a comma (Gyro X, deg/s), or between bars as RaceCapture writes it (AccelX|"G"|-3.0|3.0|25).
+_COMMA = re.compile(r"^(.*\S)\s*,\s*([^,]+)$")
+_BARRED = re.compile(r"^\"?([^|\"]+)\"?\|\s*\"?([^|\"]*)\"?\s*(?:\|.*)?$")
 #: A unit that only its capital parts from a letter for time or for an axis (tsMs, gyroXDps).
 _CAPITAL = re.compile(r"^(ts?)(Ms|Us|Ns)$|^(.*[a-z]_?[XYZ])(Dps|Mdps|Rads|Mps2|UT|Gauss|Mgauss|Mg)$")
 
@@ -127,13 +128,11 @@ def split_unit(name: str) -> tuple[str, str]:
     bracketed = _BRACKETED.match(name)
     if bracketed and bracketed[2].strip().lower() not in ("x", "y", "z"):  # acc[x]
         return f"{bracketed[1]} {bracketed[3]}".strip(), bracketed[2].strip()
-    slashed = _SLASHED.match(name)
-    if slashed and readings_of(slashed[2]):
-        return slashed[1].strip(), slashed[2]
-    if behind := _BEHIND.match(name):
-        base, unit = behind[1] or behind[3], behind[2] or behind[4]
-        if behind[3] or readings_of(unit):
-            return base.strip(), unit.strip()
+    for pattern in (_SLASHED, _COMMA):
+        if (behind := pattern.match(name)) and readings_of(behind[2]):
+            return behind[1].strip(), behind[2].strip()
+    if barred := _BARRED.match(name):
+        return barred[1].strip(), barred[2].strip()
     for gap in list(re.finditer(r"[_\s-]+", name))[-3:]:  # m_s_2 is the longest
         if gap.start() and readings_of(name[gap.end() :]):
             return name[: gap.start()], name[gap.end() :]
