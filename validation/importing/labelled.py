@@ -35,6 +35,8 @@ _ONE = re.compile(rf"{_NAME}\s*[:=]\s*({_NUMBER}){_END}")
 #: three numbers behind one name, in brackets or not
 _THREE = re.compile(rf"{_NAME}\s*(?:[:=]\s*)?\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]{_END}")
 _BARE_THREE = re.compile(rf"{_NAME}\s*[:=]\s*[(<]?\s*({_NUMBER}(?:\s*[,;\t ]\s*{_NUMBER}){{2}})\s*[)>]?{_END}")
+#: a sensor's name before axes that have each their own ("Gyro: x= 0.1 | y= 0.2")
+_OWNER = re.compile(rf"{_NAME}\s*:\s*(?=[xyzXYZ]\s*[:=])")
 #: a word of its own before the first name ("Scaled. Acc (mg)")
 _WORD = re.compile(r"^[^\W\d]+\.\s+")
 _UNIT = re.compile(r" \([^()]*\)$")
@@ -94,6 +96,8 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     [('X', '-0.5'), ('Y', '1.2'), ('Z', '9')]
     >>> labelled_cells("Mag (uT) [ 1, 2, 3 ]")
     [('Mag (uT) x', '1'), ('Mag (uT) y', '2'), ('Mag (uT) z', '3')]
+    >>> labelled_cells("Gyro:  x= 0.1 | y= 2 | z= 3")
+    [('Gyro x', '0.1'), ('Gyro y', '2'), ('Gyro z', '3')]
     """
     if line.startswith(BEGINS):
         return sentence_cells(line)
@@ -108,6 +112,9 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     at, owner, units = 0, "", dict[str, str]()
     cells: list[tuple[str, str, str]] = []
     while at < len(text):
+        if (match := _OWNER.match(text, at)) is not None:
+            owner, at = match[1].strip(), match.end()
+            continue
         if (match := _THREE.match(text, at) or _BARE_THREE.match(text, at)) is not None:
             numbers, owner = re.split(r"[\s,;]+", match[2].strip()), match[1].strip()
             named = names_of_list(owner, len(numbers))

@@ -211,6 +211,21 @@ def test_a_clock_behind_a_word_and_a_counter_without_names_is_the_time(tmp_path)
     assert {*samples} == {"gyroscope", "accelerometer", "magnetometer"}
 
 
+def test_axes_behind_their_sensors_name_with_bars_between_are_read(tmp_path):
+    """What an example for the BNO055 prints was said to hold no rows of numbers."""
+    sensors = (("Orient", np.zeros_like(LOG.mag)), ("Gyro", LOG.gyro), ("Mag", LOG.mag), ("Accl", LOG.accel))
+    lines = []
+    for k in range(LOG.t.size):
+        lines += [f"{name}:\tx= {v[k, 0]:.3f} |\ty= {v[k, 1]:.3f} |\tz= {v[k, 2]:.3f}" for name, v in sensors]
+        lines.append("")
+    raw = tmp_path / "serial.txt"
+    raw.write_text("\n".join(lines))
+    samples = import_log(raw).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-3)
+    assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-3)
+    assert_allclose(samples["magnetometer"].value, LOG.mag, atol=1e-3)
+
+
 @pytest.mark.parametrize("stamped", [True, False])
 def test_what_a_device_prints_for_teleplot_is_read(tmp_path, stamped):
     """One number a line, with or without the time and a unit; there were "no rows of numbers in it"."""

@@ -65,6 +65,53 @@ def test_a_kind_that_is_rare_or_broken_off_is_named(tmp_path):
     assert "not read: BOOT, EVT" in found.summary()
 
 
+def flysight(sensors: bool) -> str:
+    """Return a file of a FlySight 2: of its sensors, or of its receiver, which flies north by 3 m/s."""
+    lines = ["$FLYS,1", "$VAR,FIRMWARE_VER,v2023.09.22"]
+    if not sensors:
+        lines += ["$COL,GNSS,time,lat,lon,hMSL,velN,velE,velD,numSV", "$UNIT,GNSS,,deg,deg,m,m/s,m/s,m/s,", "$DATA"]
+        places = [(k, 47.4 + 3.0 * LOG.t[k] / 111178.0) for k in range(0, LOG.t.size, 20)]
+        return "\n".join(
+            [*lines, *(f"$GNSS,{LOG.t[k]:.3f},{lat:.8f},8.5,450.0,3.00,0.00,0.00,14" for k, lat in places), ""]
+        )
+    lines += ["$COL,IMU,time,wx,wy,wz,ax,ay,az,temperature", "$UNIT,IMU,s,deg/s,deg/s,deg/s,g,g,g,deg C"]
+    lines += ["$COL,MAG,time,x,y,z,temperature", "$UNIT,MAG,s,gauss,gauss,gauss,deg C", "$DATA"]
+    for k, t in enumerate(LOG.t):
+        cells = [*(LOG.gyro[k] / DEG), *(LOG.accel[k] / G0)]
+        lines.append(f"$IMU,{t:.3f}," + ",".join(f"{cell:.5f}" for cell in cells) + ",25.1")
+        lines.append(f"$MAG,{t:.3f}," + ",".join(f"{cell / 100:.5f}" for cell in LOG.mag[k]) + ",25")
+    return "\n".join([*lines, ""])
+
+
+def test_columns_and_units_of_a_kind_stand_in_lines_of_their_own(tmp_path):
+    """All of the magnetometer's rows were left out, and units guessed."""
+    raw = tmp_path / "SENSOR.CSV"
+    raw.write_text(flysight(sensors=True))
+    found = import_log(raw)
+    assert_whole(found.recordings[0].samples)
+    said = found.summary()
+    assert "read: IMU, MAG; not read: VAR" in said
+    assert "gyroscope unit: deg/s (certain: the header says so" in said
+    assert "magnetometer unit: gauss (certain: the header says so" in said
+
+
+def test_a_single_kind_whose_columns_are_named_is_read(tmp_path):
+    folder = tmp_path / "17-12-34"
+    folder.mkdir()
+    (folder / "SENSOR.CSV").write_text(flysight(sensors=True))
+    (folder / "TRACK.CSV").write_text(flysight(sensors=False))
+    samples = import_log(folder).recordings[0].samples
+    assert_whole(samples)
+    assert_allclose(samples["gps"].value[:, 3:], [[3.0, 0.0, 0.0]] * 100)
+    assert_allclose(samples["gps"].value[:, 0], 3.0 * samples["gps"].t, atol=0.02)
+
+
+def test_a_checksum_behind_a_record_is_no_part_of_its_last_cell(tmp_path):
+    raw = tmp_path / "telemetry.txt"
+    raw.write_text("".join(f"${line}*5A\n" for line in records("").splitlines()))
+    assert_whole(import_log(raw).recordings[0].samples)
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -117,6 +117,8 @@ def test_a_clock_is_found_under_a_name_in_any_script(tmp_path, name):
     [
         ("log.csv", "# Device: X, baud rate 115200, I2C 400 kHz\n# Sampling rate: 200 Hz\n"),
         ("log.csv", "Logger 3\nODR = 200\n\n"),
+        ("log.csv", "# Config: data_rate = 200.0 Hz, filter = 42 Hz, gyro_range = 2000.0 dps\n"),
+        ("log.csv", "# serial data rate: 115200 baud\n# Data rate 0.2 kHz, clock 8 MHz\n"),
         ("log_200Hz.csv", ""),
     ],
 )

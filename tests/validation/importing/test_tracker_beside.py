@@ -112,6 +112,15 @@ def test_a_table_of_fixes_is_read_by_the_proposed_map(tmp_path, head, stamp, hei
     assert_whole_by_its_map(tmp_path, raw, log)
 
 
+def test_units_in_brackets_in_a_line_of_their_own_may_lack_those_of_the_last_columns(tmp_path):
+    """As FlySight writes them: that line was taken for the names, and the file refused."""
+    head = "time,lat,lon,hMSL,v,numSV\n(s),(deg),(deg),(m),(m/s),"
+    raw = folder(tmp_path, "track.csv", table(head, lambda t: t))
+    log = import_log(raw)
+    assert 'columns = ["lat", "lon", "hMSL"]' in log.map_text
+    assert_whole_by_its_map(tmp_path, raw, log)
+
+
 def test_speed_and_heading_are_left_out_aloud(tmp_path):
     raw = folder(tmp_path, "gps.csv", table("time_ms,lat,lon,alt,speed_m_s,heading (deg)", lambda t: 1000 * t))
     (said,) = [note for note in import_log(raw).notes if "velocity north, east and down" in note]

@@ -254,9 +254,9 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
     above = [index for index in range(record) if lines[index].strip()]
     texts = [_header_cells(lines[index], layout) for index in above]
     units: tuple[str, ...] = ()
-    if len(texts) > 1 and len(texts[-1]) == len(texts[-2]) >= width - 1 and _looks_like_units(texts[-1], layout):
+    if len(texts) > 1 and _are_units(texts[-1], texts[-2], width, layout):
         units, texts, above = tuple(texts.pop()), texts, above[:-1]
-        units = units[:width]
+        units = (*units, *[""] * (len(texts[-1]) - len(units)))[:width]
     written = texts[-1] if texts else []
     if layout.lists and texts:
         texts[-1] = _spread_names(written, lines[record], layout)
@@ -341,6 +341,14 @@ def _names_sensors(cells: list[str]) -> bool:
     from discsim.validation.importing.sniffing.names import read_name, sensor_of
 
     return sum(sensor_of(read_name(cell).base) is not None for cell in cells) > 2
+
+
+def _are_units(cells: list[str], names: list[str], width: int, layout: Layout) -> bool:
+    """Tell a line of units below one of names; those of the last columns may be empty where all stand in brackets."""
+    if not len(cells) <= len(names) >= width - 1:
+        return False
+    bracketed = all(not cell or cell[0] in "([{<" for cell in cells)
+    return (len(cells) == len(names) or bracketed) and _looks_like_units(cells, layout)
 
 
 def _looks_like_units(cells: list[str], layout: Layout) -> bool:

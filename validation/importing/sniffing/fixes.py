@@ -31,7 +31,7 @@ _MOTION = {"speed", "spd", "sog", "gspeed", "groundspeed", "velocity", "vel"} | 
 }
 #: Names of a velocity's parts, without blanks and unit: vn, vel_n, velN, velocity north, north velocity, velD, velU.
 _PART = re.compile(
-    r"(?:gps)?(?:v|vel|velocity)(n|e|d|u|north|east|down|up)|(?:gps)?(north|east|down|up)(?:vel|velocity)"
+    r"(?:gps|gnss)?(?:v|vel|velocity)(n|e|d|u|north|east|down|up)|(?:gps|gnss)?(north|east|down|up)(?:vel|velocity)"
 )
 
 #: Dates are read as seconds since 2000; other clocks count from 1970, s.

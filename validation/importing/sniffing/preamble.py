@@ -13,8 +13,8 @@ _NUMBER = r"(\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
 _HERTZ = re.compile(rf"{_NUMBER}\s*_?(k?)Hz(?![A-Za-z])", re.IGNORECASE)
 #: Words before a number of rows a second where the unit is not written.
 _RATE = re.compile(
-    rf"(?:sampl\w*[ _-]*(?:rate|freq\w*)|(?:output|measurement)[ _-]*rate|\bodr\b)"
-    rf"\W{{0,4}}(?:(k?)Hz\W{{0,4}}(?:[_.]+ *)?)?{_NUMBER}",
+    rf"(?:sampl\w*[ _-]*(?:rate|freq\w*)|(?:data|output|measurement)[ _-]*rate|\bodr\b)"
+    rf"\W{{0,4}}(?:(k?)Hz\W{{0,4}}(?:[_.]+ *)?)?{_NUMBER}(?![\d.,]*\s*k?(?:baud|bps|bits?\b))(?:\s*_?(k)Hz)?",
     re.IGNORECASE,
 )
 #: A frequency that stands beside these is another one.
@@ -31,15 +31,23 @@ def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
     (200.0, '# Sampling rate: 200 Hz')
     >>> stated_rate(["Measurement rate, Hz ___________ 1000"])
     (1000.0, 'Measurement rate, Hz ___________ 1000')
+    >>> stated_rate(["# Config: data_rate = 2000.0 Hz, filter = 488 Hz"])
+    (2000.0, '# Config: data_rate = 2000.0 Hz, filter = 488 Hz')
     """
     found = {}
     for line in lines:
         if _OTHER.search(line):
             continue
         rates = [_value(m[1]) * (1000 if m[2] else 1) for m in _HERTZ.finditer(line)]
-        rates = rates or [_value(m[2]) * (1000 if m[1] else 1) for m in _RATE.finditer(line)]
+        rates = rates or _rates_by_words(line)
         found.update({rate: line.strip() for rate in rates if rate > 0})
+    if not found:  # beside other frequencies the one that its words call the rate of the rows
+        found = {rate: line.strip() for line in lines for rate in _rates_by_words(line) if rate > 0}
     return next(iter(found.items())) if len(found) == 1 else None
+
+
+def _rates_by_words(line: str) -> list[float]:
+    return [_value(m[2]) * (1000 if m[1] or m[3] else 1) for m in _RATE.finditer(line)]
 
 
 def stated_worths(lines: Sequence[str]) -> dict[str, Reading]:

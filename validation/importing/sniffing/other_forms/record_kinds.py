@@ -1,6 +1,7 @@
-"""Lines of records of several kinds, each with its kind in front (`IMU,12,0.1,..`, `GPS,12,47.4,..`): a table for each.
+"""Lines of records of several kinds, each with its kind in front (`IMU,12,0.1,..`, `$GPS,12,47,..`): a table for each.
 
-As one table only the records of the most usual length would be rows.
+As one table only the records of the most usual length would be rows. A FlySight 2 names the columns of a kind in a line
+of their own, and their units in another (`$COL,IMU,time,wx,..`, `$UNIT,IMU,s,deg/s,..`).
 """
 
 from __future__ import annotations
@@ -23,7 +24,11 @@ from discsim.validation.importing.sniffing.other_forms.written import (
 
 __all__ = ["begins", "write_tables"]
 
-_KIND = re.compile(r"[^\W\d][\w-]*")
+_KIND = re.compile(r"\$?[^\W\d][\w-]*")
+#: A checksum behind a record, as of NMEA's sentences.
+_CHECKSUM = re.compile(r"\*[0-9A-Fa-f]{2}$")
+#: Records that name the columns of the kind which comes next in them, and their units.
+_COLUMNS, _UNITS = "COL", "UNIT"
 _NUMBER = re.compile(NUMBER)
 _SEPARATORS = ",;\t|"
 #: Share of a log's lines that must be records of its kinds, and of a kind's that must be as long as one another: a line
@@ -56,7 +61,7 @@ class _Kind(NamedTuple):
 
 
 def begins(path: Path) -> bool:
-    """Tell a text of records of two kinds or more that differ in how many cells they have."""
+    """Tell a text of records of kinds that differ in how many cells they have, or whose columns it names."""
     _, lines = first_lines(path)
     return _separator_of(lines) is not None
 
@@ -68,8 +73,10 @@ def _separator_of(lines: Iterable[str]) -> str | None:
         kinds = _kinds(some, separator)
         tables = [kind for kind in kinds.values() if kind.regular and kind.rows > 1]
         read = sum(kind.rows + bool(kind.names) for kind in kinds.values())
-        lengths = {kind.length for kind in tables}
-        if len(lengths) > 1 and read >= _MOST * len(some) and max(kind.rows for kind in tables) >= FEWEST:
+        told = len({kind.length for kind in tables}) > 1 or (
+            bool(tables) and any(word == _COLUMNS for _, word, _ in _records(some, separator))
+        )
+        if told and read >= _MOST * len(some) and max(kind.rows for kind in tables) >= FEWEST:
             return separator
     return None
 
@@ -78,7 +85,11 @@ def _kinds(lines: Iterable[str], separator: str) -> dict[str, _Kind]:
     """Return what is there of each kind of record, by its word; names stand above a kind's first record."""
     lengths: dict[str, Counter[int]] = {}
     names: dict[str, tuple[str, ...]] = {}
+    units: dict[str, tuple[str, ...]] = {}
     for _, word, cells in _records(lines, separator):
+        if word in (_COLUMNS, _UNITS) and _KIND.fullmatch(cells[0]):
+            (names if word == _COLUMNS else units)[cells[0]] = tuple(cells[1:])
+            continue
         if word not in lengths and len(lengths) >= _MAX_KINDS:
             continue
         seen = lengths.setdefault(word, Counter())
@@ -87,7 +98,14 @@ def _kinds(lines: Iterable[str], separator: str) -> dict[str, _Kind]:
             seen[len(cells)] += 1
         elif not seen and not numbers and all(cells):
             names[word] = tuple(cells)
-    return {word: _Kind(seen, names.get(word, ())) for word, seen in lengths.items()}
+    return {word: _Kind(seen, _with_units(names.get(word, ()), units.get(word, ()))) for word, seen in lengths.items()}
+
+
+def _with_units(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names with their units in brackets, where as many are stated."""
+    if len(units) != len(names):
+        return names
+    return tuple(f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True))
 
 
 def _records(lines: Iterable[str], separator: str) -> Iterator[tuple[str, str, list[str]]]:
@@ -97,10 +115,10 @@ def _records(lines: Iterable[str], separator: str) -> Iterator[tuple[str, str, l
     """
     for line in lines:
         stamp, text = split_stamp(line)
-        word, *cells = (cell.strip() for cell in text.split(separator))
+        word, *cells = (cell.strip() for cell in _CHECKSUM.sub("", text.rstrip()).split(separator))
         named = len(cells) > 1 and all(_KIND.fullmatch(cell) for cell in cells[1::2])
         if len(cells) >= 2 and _KIND.fullmatch(word) and (not named or _KIND.fullmatch(cells[0])):
-            yield stamp, word, cells
+            yield stamp, word.removeprefix("$"), cells
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:
