@@ -61,7 +61,7 @@ def first_trajectory(recording: Recording, ratio: float = 1.0, nodes: FloatArray
     """
     nodes, plant = nodes_of(recording) if nodes is None else nodes, plant_of(recording)
     found = trajectory_of(recording, nodes, plant.initial.states(recording, nodes[:-1], ratio))
-    return replace(found, trust_radius=plant.sizes.of_path) if plant.from_release(recording) else found
+    return replace(found, trust_radius=plant.sizes.of_path) if plant.path_alone(recording) else found
 
 
 def begun_again(current: Trajectory, ratio: float = 1.0) -> Trajectory:

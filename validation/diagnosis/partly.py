@@ -41,8 +41,8 @@ def partly_explained(found: Search, names: Sequence[str]) -> tuple[PartlyExplain
     for fitted, before in _tried(found):
         candidates = fitted.hypothesis.candidates
         about = replace(found, final=fitted, base=before).about(fitted.fit)
-        if fitted.fit.from_release:
-            each = _heldout_from_release(before, fitted)
+        if fitted.fit.path_alone:
+            each = _heldout_of_paths(before, fitted)
         else:
             each = [_heldout(about, i) for i in range(len(names))]
         total, left = np.sum(each, axis=0)
@@ -82,8 +82,8 @@ def _heldout(found: Search, i: int) -> tuple[float, float]:
     return before / found.base.residuals[i].size, after / found.final.fit.linears[i].raw.size
 
 
-def _heldout_from_release(before: ContinuousFit, fitted: ContinuousFit) -> list[tuple[float, float]]:
-    """Return what `_heldout` does for flights of which their release tells the most, by fits of each alone.
+def _heldout_of_paths(before: ContinuousFit, fitted: ContinuousFit) -> list[tuple[float, float]]:
+    """Return what `_heldout` does for flights seen from outside alone, by fits of each alone.
 
     What a fit moves stated numbers by is counted with what it leaves, both in the noise that the baseline leaves: in
     that of the readings any release would serve the path.

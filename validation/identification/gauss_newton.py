@@ -133,9 +133,9 @@ class Fit:
         return self.plant.continuous_defects([one.recording for one in self.trajectories])
 
     @property
-    def from_release(self) -> bool:
-        """Whether nothing but what is stated of their release tells how its motions begin."""
-        return all(self.plant.from_release(trajectory.recording) for trajectory in self.trajectories)
+    def path_alone(self) -> bool:
+        """Whether paths, and what is stated of a release, are all that tells of its motions: no sensor flew along."""
+        return all(self.plant.path_alone(trajectory.recording) for trajectory in self.trajectories)
 
     @property
     def counted(self) -> bool:

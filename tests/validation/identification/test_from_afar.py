@@ -61,7 +61,7 @@ def test_such_a_throw_is_one_segment_whose_turn_about_its_axis_is_held():
     recording = path_of()
     plant = plant_of(recording)
     first = first_trajectory(recording)
-    assert plant.from_release(recording)
+    assert plant.path_alone(recording)
     assert len(first.states) == 1
     assert first.trust_radius is plant.sizes.of_path
     with_gyroscope = record(
@@ -72,5 +72,7 @@ def test_such_a_throw_is_one_segment_whose_turn_about_its_axis_is_held():
         name="logged",
         disc=DRIVER,
     )
-    assert not plant.from_release(replace(with_gyroscope, release=recording.release))
-    assert not plant.from_release(replace(recording, release=replace(recording.release, velocity=None)))
+    assert not plant.path_alone(replace(with_gyroscope, release=recording.release))
+    assert not plant.path_alone(replace(recording, release=replace(recording.release, roll=None)))
+    # of which no velocity is stated, the path tells how it begins (`release_from_path`)
+    assert plant.path_alone(replace(recording, release=replace(recording.release, velocity=None)))

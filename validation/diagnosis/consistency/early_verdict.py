@@ -155,11 +155,11 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
     """Return which sensors contradict which, or None where some motion follows them, or may with a sensor's delay.
 
     ``known`` are the stated numbers that may move. Of free spins, whose beginnings follow anything, only their rates
-    are asked here, what follows their readings later (`contradiction_after`). Flights from a stated release alone have
-    no beginning that follows it whatever is missing.
+    are asked here, what follows their readings later (`contradiction_after`). Flights seen from outside alone have
+    no beginning that follows them whatever is missing.
     """
     sensors, plant = [name for name in SENSORS if any(name in one for one in recordings)], plant_of(recordings[0])
-    if all(plant.from_release(one) for one in recordings):
+    if all(plant.path_alone(one) for one in recordings):
         return None
     if plant.weakly_identified:
         apart_by = rates_apart(recordings)

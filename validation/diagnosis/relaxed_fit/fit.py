@@ -72,7 +72,7 @@ def relaxed(
     bare = linearised(fit, ())
     seen = true_noise([readings for trajectory in trajectories for readings in trajectory.readings])
     fit = replace(fit, noise=stated_noise(bare, {group: level.sd for group, level in seen.items()}))
-    if fit.from_release:
+    if fit.path_alone:
         return fitted_from_afar(fit)
     count = sum(linear.raw.size for linear in bare)
     fit = _reweighted(fit, count) if supposed else fitted_further(fit, count)

@@ -44,7 +44,7 @@ def begun_anew(fit: Fit, first: Sequence[Trajectory], given: Sequence[Linear] = 
     ``given``, leaves as much: it is noisier than the others, or lacks physics that both lack.
     """
     other_time = fit.plant.airborne and any(time_ratio(fit.values(i)) != 1.0 for i in range(len(fit.trajectories)))
-    in_doubt = fit.plant.weakly_identified or (other_time and not fit.from_release)
+    in_doubt = fit.plant.weakly_identified or (other_time and not fit.path_alone)
     if not in_doubt or len(fit.trajectories) < 2 or not np.isfinite(fit.merit):
         return fit
     left = _left(fit, fit.linears)

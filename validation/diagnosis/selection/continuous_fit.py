@@ -163,7 +163,7 @@ def continuous_fit(
     if not plant.airborne and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_clocks_of_longer_beginnings(fit))
     begun = fit
-    if fit.from_release:
+    if fit.path_alone:
         return scored(hypothesis, fitted_from_afar(fit, bounds=BOUNDS))
     fit = refit(fit, iterations=iterations, bounds=BOUNDS, bars=bars)
     if not np.isfinite(fit.merit):

@@ -52,7 +52,7 @@ def screened(problem: SearchProblem, before: Search | None = None) -> Search:
     noise = _noise_of(relaxed_fit)
     candidates = _competing(problem, relaxed_fit.plant)
     problem.progress("asking every effect", 1, 4)
-    asked_in = relaxed_fit.noise if relaxed_fit.from_release else noise
+    asked_in = relaxed_fit.noise if relaxed_fit.path_alone else noise
     equations = normal_equations_of(relaxed_fit, candidates, asked_in, relaxed_fit.continuous_defects)
     problem.progress("fitting the baseline", 2, 4)
     bars = NO_BARS if before is None else hopeless(chi2_in(before.final, noise), before.final.fit.count)
@@ -93,9 +93,9 @@ def _competing(problem: SearchProblem, plant: Plant) -> tuple[CandidateEffect, .
 def _noise_of(relaxed_fit: Fit) -> NoiseModel:
     """Return the noise of readings: what the relaxed fit leaves of them.
 
-    A flight that only its release tells is not followed so closely: there the readings themselves show their noise.
+    A flight seen from outside alone is not followed so closely: there the readings themselves show their noise.
     """
-    if relaxed_fit.from_release:
+    if relaxed_fit.path_alone:
         return true_noise([readings for trajectory in relaxed_fit.trajectories for readings in trajectory.readings])
     return estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
 

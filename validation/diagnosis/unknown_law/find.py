@@ -159,7 +159,7 @@ def find_law(search: Search, *, instead: bool = True, moves_out: bool = False) -
     """
     relaxed_fit, best, noise, recordings = search.relaxed_fit, search.final, search.relaxed_noise, search.recordings
     plant = relaxed_fit.plant
-    if relaxed_fit.from_release:
+    if relaxed_fit.path_alone:
         return None  # a path alone leaves no motion beside the data
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
@@ -246,7 +246,7 @@ def left_to_gain(fit: Fit, about: Collection[str]) -> float:
 
     ``about`` is what terms may stand on: "motion", or sensors. Of those on a sensor their coefficients are paid.
     """
-    if fit.from_release:
+    if fit.path_alone:
         return 0.0
     gains = [0.0]
     if "motion" in about and (motion := _on_motion(fit.plant)):

@@ -37,15 +37,17 @@ from discsim.validation.identification.initial.path import (
     dead_reckoning,
     in_ned,
     integrated,
+    normals_of,
     path_fixes,
     path_states,
     specific_force_by,
 )
 from discsim.validation.identification.initial.release_from_field import release_from_field
 from discsim.validation.identification.initial.release_from_forces import Told, release_from_forces
+from discsim.validation.identification.initial.release_from_path import release_from_path
 from discsim.validation.identification.initial.smoothing import GRID
 
-__all__ = ["InitialStates", "flight_initial_states", "flight_starts", "spin_initial_states"]
+__all__ = ["InitialStates", "begins_open", "flight_initial_states", "flight_starts", "spin_initial_states"]
 
 
 #: sensors that fly with the disc
@@ -84,7 +86,7 @@ def flight_starts(recording: Recording, t: FloatArray) -> Iterator[InitialStates
     (`release_from_forces`, of a magnetometer alone `release_from_field`): that alone leaves several to choose from.
     Without path or accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless
     the release states it; the others are in ``ambiguous``. With no sensor on board at all, the flight that the baseline
-    predicts from a stated release is the start.
+    predicts from a stated release is the start, or without one those that fit the path (`release_from_path`).
     """
     t = np.asarray(t, dtype=float)
     if not any(sensor in recording for sensor in ON_BOARD):
@@ -92,12 +94,17 @@ def flight_starts(recording: Recording, t: FloatArray) -> Iterator[InitialStates
         if predicted is not None:
             yield predicted
             return
+    if begins_open(recording):
+        for flown in release_from_path(recording, t):
+            yield _finite(InitialStates(t, *flown, ()))
     frame = frame_of(recording)
     grid = _even(t, recording)
     fixes = path_fixes(recording)
     force_felt = specific_force_by(recording, frame)
     pair = None if fixes is None else compared(fixes, force_felt, grid, recording.environment.gravity)
-    normals = None if fixes is None or pair is None else _normals(recording, path_states(fixes, None, grid)[1], pair[0])
+    normals = (
+        None if fixes is None or pair is None else normals_of(recording, path_states(fixes, None, grid)[1], pair[0])
+    )
     if fixes is not None and force_felt is not None and pair is not None and normals is not None:
         phase_drift = _phase_drift(frame, recording.environment.magnetic_field, grid, pair, normals)
         if phase_drift is not None:
@@ -120,6 +127,13 @@ def flight_starts(recording: Recording, t: FloatArray) -> Iterator[InitialStates
             position, velocity = dead_reckoning(recording, force, t, None if start is None else start.velocity)
         others = () if certain or told else other_attitudes(recording, attitude[0])
         yield _finite(InitialStates(t, position, velocity, attitude, rate, others))
+
+
+def begins_open(recording: Recording) -> bool:
+    """Tell a flight that was seen from outside alone, and of which no velocity at release is stated."""
+    release = recording.release
+    stated = release is not None and release.velocity is not None
+    return not stated and not any(sensor in recording for sensor in ON_BOARD)
 
 
 def _predicted(recording: Recording, t: FloatArray) -> InitialStates | None:
@@ -211,30 +225,6 @@ def _from_to(m: FloatArray, f: FloatArray, axis: FloatArray) -> ComplexArray:
     x = m - np.sum(m * z, axis=1, keepdims=True) * z
     x = x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-9)
     return np.asarray(np.sum(x * f, axis=1) + 1j * np.sum(np.cross(z, x) * f, axis=1))
-
-
-def _normals(recording: Recording, velocity: FloatArray, force: FloatArray) -> FloatArray | None:
-    """Return the spin axis in N (n, 3), as long as the lift's share of the specific force (n, 3), from a path alone.
-
-    Lift is across the airspeed, in its plane with the axis, and its size tells the angle of attack, (20), (21). Lift
-    is taken to point away from z_B. None where the disc's aerodynamics are unknown.
-    """
-    disc, density = recording.disc, recording.environment.air_density
-    if disc is None or disc.aero is None or density is None:
-        return None
-    relative = velocity - recording.environment.wind
-    speed = np.maximum(np.linalg.norm(relative, axis=1, keepdims=True), 1.0)
-    along = relative / speed
-    across = force - np.sum(force * along, axis=1, keepdims=True) * along
-    lift = np.linalg.norm(across, axis=1, keepdims=True)
-    alpha = np.linspace(-0.3, 0.6, 181)
-    CL = disc.aero.CL0 + disc.aero.CLa * alpha
-    if disc.aero_table is not None:
-        CL = np.interp(alpha, disc.aero_table.alpha, disc.aero_table.CL)
-    needed = lift * disc.mass / (0.5 * density * speed**2 * disc.area)
-    found = alpha[np.argmin(np.abs(CL[None, :] - needed), axis=1)][:, None]
-    z = -np.cos(found) * across / np.maximum(lift, 1e-6) + np.sin(found) * along
-    return np.asarray(z * np.minimum(lift, 20.0))
 
 
 # ---------------------------------------------------------------------------------------------- path

@@ -27,6 +27,7 @@ __all__ = [
     "in_ned",
     "integrated",
     "local_cubics",
+    "normals_of",
     "path_fixes",
     "path_states",
     "specific_force_by",
@@ -317,3 +318,27 @@ def dead_reckoning(
         return position + velocity * t[:, None], np.tile(velocity, (t.size, 1))
     moved, gained = force_felt.integrals_at(t)
     return position + velocity * t[:, None] + moved, velocity + gained
+
+
+def normals_of(recording: Recording, velocity: FloatArray, force: FloatArray) -> FloatArray | None:
+    """Return the spin axis in N (n, 3), as long as the lift's share of the specific force (n, 3), from a path alone.
+
+    Lift is across the airspeed, in its plane with the axis, and its size tells the angle of attack, (20), (21). Lift
+    is taken to point away from z_B. None where the disc's aerodynamics are unknown.
+    """
+    disc, density = recording.disc, recording.environment.air_density
+    if disc is None or disc.aero is None or density is None:
+        return None
+    relative = velocity - recording.environment.wind
+    speed = np.maximum(np.linalg.norm(relative, axis=1, keepdims=True), 1.0)
+    along = relative / speed
+    across = force - np.sum(force * along, axis=1, keepdims=True) * along
+    lift = np.linalg.norm(across, axis=1, keepdims=True)
+    alpha = np.linspace(-0.3, 0.6, 181)
+    CL = disc.aero.CL0 + disc.aero.CLa * alpha
+    if disc.aero_table is not None:
+        CL = np.interp(alpha, disc.aero_table.alpha, disc.aero_table.CL)
+    needed = lift * disc.mass / (0.5 * density * speed**2 * disc.area)
+    found = alpha[np.argmin(np.abs(CL[None, :] - needed), axis=1)][:, None]
+    z = -np.cos(found) * across / np.maximum(lift, 1e-6) + np.sin(found) * along
+    return np.asarray(z * np.minimum(lift, 20.0))

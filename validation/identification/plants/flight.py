@@ -29,7 +29,12 @@ from discsim.recording import Recording
 from discsim.step_ends import share_to_kink
 from discsim.toml_table import TomlTable
 from discsim.validation.identification.dynamics import FASTEST, SIZE, acting_tables, physics_of
-from discsim.validation.identification.initial.flight import InitialStates, flight_initial_states, flight_starts
+from discsim.validation.identification.initial.flight import (
+    InitialStates,
+    begins_open,
+    flight_initial_states,
+    flight_starts,
+)
 from discsim.validation.identification.parameters import AllowedDefects, Values
 from discsim.validation.identification.plants.flight_neighbours import SLOWEST, add_neighbours
 from discsim.validation.identification.plants.law_terms import Term
@@ -196,7 +201,10 @@ def _other_states(recording: Recording, t: FloatArray, ratio: float) -> tuple[Fl
     return tuple(_rows(one, ratio) for one in islice(starts, 1, None))
 
 
-def _from_release(recording: Recording) -> bool:
+def _path_alone(recording: Recording) -> bool:
+    """Tell a flight that no sensor flew along with: its release is stated in full, or its path tells how it begins."""
+    if begins_open(recording):
+        return True
     release = recording.release
     if release is None or not BOARD.isdisjoint(recording.samples):
         return False
@@ -206,7 +214,7 @@ def _from_release(recording: Recording) -> bool:
 def _nodes(recording: Recording, segment: float) -> FloatArray:
     """Return the nodes (k + 1,) of segments, s: a path tells no turning, and so not how segments go on."""
     nodes = even_nodes(recording, segment)
-    return nodes[[0, -1]] if _from_release(recording) else nodes
+    return nodes[[0, -1]] if _path_alone(recording) else nodes
 
 
 def _lacks(recording: Recording) -> str | None:
@@ -406,5 +414,5 @@ FLIGHT = Plant(
     laws=MotionLaws(_terms(), _symbols, moment_step=2e-4, places=_places),
     design=Design(_about, _read),
     nodes=_nodes,
-    from_release=_from_release,
+    path_alone=_path_alone,
 )

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
+from discsim.effects.kind import BOARD
 from discsim.frames import body_to_ned, multiply, quaternion_from_euler, turn
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
@@ -108,6 +109,16 @@ def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
 
 def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
     return spin_initial_states(recording, np.zeros(1)).ambiguous
+
+
+def _lacks(recording: Recording) -> str | None:
+    """Refuse what was seen from outside alone: nothing of it would be compared, and so nothing would seem missing."""
+    if not recording.samples or not BOARD.isdisjoint(recording.samples):
+        return None
+    return (
+        "a free spin needs a sensor on board that shows it turning (magnetometer, gyroscope or accelerometer); "
+        'a path alone is told as plant = "flight", with [disc] and air_density_kg_m3'
+    )
 
 
 def _grows_with(t: FloatArray, states: FloatArray) -> dict[str, FloatArray]:
@@ -286,6 +297,7 @@ _BALANCED = Plant(
     held=_HELD,
     zeros=_ZEROS,
     hardware=("disc",),
+    lacks=_lacks,
     observed=_observed,
     path_known=False,
     weakly_identified=True,

@@ -376,8 +376,8 @@ class Plant:
         See these types.
     nodes : function
         The nodes (k + 1,) of a recording's segments, s, of about a given length.
-    from_release : function
-        Whether what a recording states of its release tells how it begins to turn, and no reading does.
+    path_alone : function
+        Whether a recording has a path and no reading of how the body turns.
     own : tuple of Parameter
         Parameters of its motion that neither the catalogue nor a recording's hardware has, with what is known of them
         before any reading; their group is its name. Each recording has its own, unless a fit says otherwise.
@@ -421,7 +421,7 @@ class Plant:
     sizes: Sizes
     durations: Durations
     nodes: Callable[[Recording, float], FloatArray] = even_nodes
-    from_release: Callable[[Recording], bool] = _readings_tell
+    path_alone: Callable[[Recording], bool] = _readings_tell
     own: tuple[Parameter, ...] = ()
     held: tuple[Parameter, ...] = ()
     zeros: tuple[Parameter, ...] = ()

@@ -18,10 +18,15 @@ from discsim.validation.importing.sniffing.fixes import ProposedFixes
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
 from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.own_place import OwnPlace
+from discsim.validation.importing.sniffing.track import DISC, SPIN, WOBBLE, ProposedTrack
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
 
 _COMMA = 'separator = ","'
+_AIR = (
+    "air_density_kg_m3 = 1.204 # dry air at 20 degC and 1013 hPa: write that of your day",
+    "# wind_ned_m_s = [0.0, 0.0, 0.0] # where known",
+)
 MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
 
 
@@ -47,8 +52,8 @@ class ProposedSensor:
 class Proposal:
     """A proposed map; ``decisions`` are those on the whole (axes), ``notes`` what else a user should know.
 
-    ``fixes`` are a receiver's and ``place`` where the log says that it was made, None where there
-    is none.
+    ``fixes`` are a receiver's, ``track`` is a camera's and ``place`` where the log says that it was made, None where
+    there is none.
     """
 
     name: str
@@ -61,6 +66,7 @@ class Proposal:
     notes: tuple[str, ...] = field(default=())
     fixes: ProposedFixes | None = None
     place: OwnPlace | None = None
+    track: ProposedTrack | None = None
 
     @property
     def all_decisions(self) -> list[Decision]:
@@ -73,6 +79,7 @@ class Proposal:
             *found,
             *self.decisions,
             *([self.fixes.decision] if self.fixes is not None and not self.fixes.apart else []),
+            *(self.track.decisions if self.track is not None else ()),
         ]
 
     def in_field(self, size: float | None) -> Proposal:
@@ -122,16 +129,20 @@ def map_text(proposal: Proposal) -> str:
         if clock.step is not None and clock.off:
             lines.append(f"step_sigma_s = {clock.step * clock.off:.2g} # leave out where the step is known")
         lines += [f"counter = {_text(name)}" for name in [clock.counter] if name is not None]
+    if proposal.track is not None:
+        lines += ["", "[disc]", _remark(proposal.track.of_disc), f"name = {_text(DISC)}"]
     lines += [
         "",
         "[environment]",
         "gravity_m_s2 = 9.80665 # standard gravity",
-        *_place(proposal.place),
+        *(_AIR if proposal.track is not None else _place(proposal.place)),
     ]
     for sensor in proposal.sensors:
         lines += _sensor(proposal, sensor)
     if proposal.fixes is not None:
         lines += ["", *_fixes(proposal, proposal.fixes)]
+    if proposal.track is not None:
+        lines += ["", *_track(proposal, proposal.track)]
     return "\n".join([*lines, ""])
 
 
@@ -219,6 +230,23 @@ def _fixes(proposal: Proposal, fixes: ProposedFixes) -> list[str]:
     if fixes.layout is not None:
         lines += ["[sensors.gps.layout] # its file is laid out in another way", *(_layout(fixes.layout) or [_COMMA])]
     return [f"# {line}" for line in (fixes.apart, *lines)] if fixes.apart else lines
+
+
+def _track(proposal: Proposal, track: ProposedTrack) -> list[str]:
+    return [
+        "[sensors.track]",
+        *_file(proposal, track.numbers),
+        *(_remark(track.of_columns), f"columns = {_texts(track.columns)}"),
+        *(_remark(track.of_unit), f"unit = {_text(track.unit)}"),
+        *(_remark(track.of_axes), f"axes = {_texts(track.axes)}"),
+        f"noise_rms_m = {track.noise:g} # of a coordinate, by third differences",
+        "",
+        "[release]",
+        "# guess: throws wobble by some rad/s and spin to either side; without bounds a path leaves both open.",
+        "# What was measured goes here, or as [throws.NAME] for the file NAME (docs/importing.md).",
+        "body_rate_rad_s = [0.0, 0.0, 0.0]",
+        f"body_rate_sigma_rad_s = [{WOBBLE}, {WOBBLE}, {SPIN}]",
+    ]
 
 
 def _about(decision: Decision, sensor: str) -> bool:

@@ -10,6 +10,7 @@ from discsim.errors import InputError
 from discsim.validation.importing.sniffing.archive import MAX_FILES
 from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.names import read_name, sensor_of, sensor_of_file
+from discsim.validation.importing.sniffing.track import coordinates_of
 
 __all__ = ["listed", "several_logs"]
 
@@ -49,8 +50,9 @@ def listed(paths: Sequence[Path]) -> str:
 
 
 def _sensors(names: Sequence[str]) -> set[str]:
-    """Return the sensors of which three columns are there by their names alone."""
+    """Return the sensors of which three columns are there by their names alone; a track where there are coordinates."""
     read = [read_name(name) for name in names]
     axes = Counter({(sensor_of(name.base), name.axis) for name in read if name.axis is not None and name.base})
     counts = Counter(sensor for sensor, _ in axes if sensor not in (None, "time"))
-    return {sensor for sensor, count in counts.items() if sensor is not None and count == 3}
+    found = {sensor for sensor, count in counts.items() if sensor is not None and count == 3}
+    return found or ({"track"} if coordinates_of(names) else set())

@@ -59,6 +59,7 @@ from discsim.validation.importing.sniffing.seen_turns import (
     ticking,
 )
 from discsim.validation.importing.sniffing.spin_axis import Reading3
+from discsim.validation.importing.sniffing.track import track_of
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
 from discsim.validation.importing.sniffing.unused import missing_axes, one_axis_rate, unused_columns
@@ -115,7 +116,11 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     if fixed is not None and any(fixed.numbers is numbers for numbers in aside):
         fixed = fixed._replace(layout=fixed.numbers.dialect.layout)
     if not found and fixed is None:
-        raise _nothing(raw, files, failures)
+        path = track_of(tables, clock)
+        if path is None:
+            raise _nothing(raw, files, failures)
+        notes = [*notes, *path.notes]
+        return Proposal(_name(raw), raw, "flight", layout, clock, (), (), tuple(notes), track=path)
     found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
     own = clocks_of_files(clock, _triples(found)).beside(own_clocks(clock, _triples(found)))
@@ -470,12 +475,14 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
         for s, (triple, decision) in found.items()
     ]
     sensors = [replace(one, time_offset=offsets[one.sensor][0]) if one.sensor in offsets else one for one in sensors]
-    name = re.sub(r"[^\w.-]+", "-", sniffed.raw.resolve().stem).strip("-") or "log"
     decided = (*own.decisions, *(told for _, told in offsets.values()), *axes.decisions)
     decisions = decided if found else ()  # positions alone have no axes of a board
-    return Proposal(
-        name, sniffed.raw, sniffed.plant, sniffed.layout, clock, tuple(sensors), decisions, (*axes.notes, *notes)
-    )
+    head = (_name(sniffed.raw), sniffed.raw, sniffed.plant, sniffed.layout, clock)
+    return Proposal(*head, tuple(sensors), decisions, (*axes.notes, *notes))
+
+
+def _name(raw: Path) -> str:
+    return re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
 
 
 def _offsets(

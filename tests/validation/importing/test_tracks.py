@@ -1,0 +1,138 @@
+"""Tracks of cameras and of motion capture, of which a map is proposed: they were refused, or taken for sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from support.made import flight
+
+from discsim.errors import InputError
+from discsim.validation.importing.imported_log import import_log
+
+T = np.arange(0.0, 1.0, 1.0 / 120.0)
+MOTION = flight(seconds=1.0)
+NED = np.column_stack([np.interp(T, MOTION.t, column) for column in MOTION.position.T])
+#: as a person draws it: x ahead, y left, z up
+XYZ = NED * (1.0, -1.0, -1.0)
+
+
+def rows(values, separator=","):
+    return "".join(separator.join(f"{cell:.6f}" for cell in row) + "\n" for row in values)
+
+
+def motive() -> str:
+    """Return a take of OptiTrack's: y up, the rigid body's turn and a marker beside its place."""
+    head = "Format Version,1.23,Take Name,Take 1,Capture Frame Rate,120.000000,Rotation Type,Quaternion,Length Units,"
+    kinds = ",Rotation" * 4 + ",Position" * 3 + ",Mean Marker Error" + ",Position" * 3
+    types = ",Rigid Body" * 8 + ",Rigid Body Marker" * 3
+    lines = [f"{head}Meters,Coordinate Space,Global", "", f",Type{types}", ",Name" + ",Disc" * 8 + ",Disc:1" * 3]
+    lines += [",ID" + ',"1"' * 11, f",{kinds}", "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z"]
+    x, y, z = XYZ.T
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (T.size, 1))
+    body = np.column_stack([x, z, -y])
+    table = np.column_stack([np.arange(T.size), T, still, body, np.full(T.size, 3e-4), body + 0.1])
+    return "\n".join(lines) + "\n" + rows(table).replace(".000000,", ",", 1)
+
+
+def vicon() -> str:
+    """Return the trajectories of Nexus: mm, no times, a second marker."""
+    head = "Trajectories\n120\n,,Disc:M1,,,Disc:M2,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n,,mm,mm,mm,mm,mm,mm\n"
+    return head + "".join(
+        f"{k + 1},0,{x:.3f},{y:.3f},{z:.3f},{x + 130:.3f},{y:.3f},{z:.3f}\n" for k, (x, y, z) in enumerate(1000 * XYZ)
+    )
+
+
+def qualisys() -> str:
+    """Return a file of QTM: mm, a marker that was not seen in one row."""
+    head = f"NO_OF_FRAMES\t{T.size}\nNO_OF_CAMERAS\t8\nNO_OF_MARKERS\t2\nFREQUENCY\t120\nNO_OF_ANALOG\t0\n"
+    head += "DESCRIPTION\t--\nDATA_INCLUDED\t3D\nMARKER_NAMES\ta\tb\nFrame\tTime\ta X\ta Y\ta Z\tb X\tb Y\tb Z\n"
+    points = 1000 * XYZ
+    points[50] = 0.0
+    return head + "".join(
+        f"{k + 1}\t{T[k]:.5f}\t{x:.3f}\t{y:.3f}\t{z:.3f}\t{x + 130:.3f}\t{y:.3f}\t{z:.3f}\n"
+        for k, (x, y, z) in enumerate(points)
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("take.csv", motive),
+        ("trial.csv", vicon),
+        ("run.tsv", qualisys),
+        ("track.csv", lambda: "t,x,y,z\n" + rows(np.column_stack([T, XYZ]))),
+        ("track.csv", lambda: "time (s),x (ft),y (ft),z (ft)\n" + rows(np.column_stack([T, XYZ / 0.3048]))),
+        ("track.csv", lambda: "t_ms,pos_x,pos_y,pos_z\n" + rows(np.column_stack([1000 * T, 1000 * XYZ]))),
+        ("track_120Hz.csv", lambda: "frame,x_m,y_m,z_m\n" + rows(np.column_stack([np.arange(T.size), XYZ]))),
+    ],
+)
+def test_a_path_is_read_as_a_flights_track(tmp_path, name: str, written: Callable[[], str]):
+    (tmp_path / name).write_text(written())
+    found = import_log(tmp_path / name)
+    (recording,) = found.recordings
+    assert recording.plant == "flight"
+    assert set(recording.samples) == {"track"}
+    track = recording.need("track")
+    whole = np.delete(np.arange(T.size), 50) if name == "run.tsv" else np.arange(T.size)
+    assert_allclose(track.value[whole], NED[whole], atol=1e-5)
+    assert_allclose(track.t, T, atol=1e-5)
+    assert recording.disc is not None
+    assert "disc: ultrastar (guess" in found.summary()
+    # the map that was proposed reads it again, and may be changed
+    (tmp_path / "map.toml").write_text(found.map_text)
+    again = import_log(tmp_path / name, str(tmp_path / "map.toml")).recordings[0]
+    assert_allclose(again.need("track").value, track.value)
+    assert again.release is not None
+    assert again.release.velocity is None
+
+
+@pytest.mark.parametrize(
+    ("text", "columns"),
+    [
+        ("\tmass A\t\nt\tx\ty\n" + rows(np.column_stack([T, XYZ[:, [0, 2]]]), "\t"), [0, 2]),
+        ("Time (ms);X (m);Y (m)\n" + rows(np.column_stack([1000 * T, XYZ[:, [0, 2]]]), ";").replace(".", ","), [0, 2]),
+    ],
+)
+def test_two_coordinates_are_a_view_from_the_side(tmp_path, text, columns):
+    """As Tracker and Kinovea write them."""
+    (tmp_path / "video.txt").write_text(text)
+    found = import_log(tmp_path / "video.txt")
+    value = found.recordings[0].need("track").value
+    assert_allclose(value[:, columns], NED[:, columns], atol=1e-5)
+    assert np.isnan(value[:, 1]).all()
+    assert "from above it is ['x', '-y', 'none']" in found.map_text
+
+
+def test_throws_in_a_folder_are_tracks_each(tmp_path):
+    folder = tmp_path / "throws"
+    folder.mkdir()
+    for name in ("throw1.csv", "throw2.csv"):
+        (folder / name).write_text("t,x,y,z\n" + rows(np.column_stack([T, XYZ])))
+    with pytest.raises(InputError, match=r"2 logs of the same columns in it \(throw1.csv, throw2.csv\)"):
+        import_log(folder)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,x_px,y_px\n" + rows(np.column_stack([T, 100 * XYZ[:, :2]])), "'x_px', 'y_px' are in pixels"),
+        ("frame,x,y\n" + rows(np.column_stack([np.arange(T.size), XYZ[:, :2]])), "no column tells the time"),
+        ("t,x,y,z\n" + rows(np.column_stack([T, np.sin(60 * T), np.cos(60 * T), T])), "no sensor of motion found"),
+        ("Trajectories\nrate\nFrame,Sub Frame\n", "breaks off in its head"),
+        ("NO_OF_FRAMES\t0\nFREQUENCY\t120\n", "breaks off in its head"),
+    ],
+)
+def test_what_is_no_path_in_metres_is_refused_by_what_it_lacks(tmp_path, text, said):
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(InputError, match=said):
+        import_log(tmp_path / "log.csv")
+
+
+def test_positions_beside_sensors_stay_what_a_program_worked_out(tmp_path):
+    turning = np.column_stack([np.cos(60 * T), np.sin(60 * T), np.full(T.size, 3000.0)])
+    text = "t,gx (deg/s),gy (deg/s),gz (deg/s),x (m),y (m),z (m)\n" + rows(np.column_stack([T, turning, XYZ]))
+    (tmp_path / "log.csv").write_text(text)
+    assert set(import_log(tmp_path / "log.csv").recordings[0].samples) == {"gyroscope"}
