@@ -38,9 +38,11 @@ _ONE_AXIS, _ONE_SPIN = 0.02, 2.0
 #: ordinary throws: rates across the axis and spin, rad/s; speed across what a single camera sees, m/s
 _WOBBLE, _SPIN, _UNSEEN = 3.0, 80.0, 2.0
 _SCALES = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5, 0.1, 0.1, 0.5, 0.5, 10.0)
-_STEP, _TRIES = 1e-4, 30
+_STEP, _TRIES = 1e-4, 15
+#: share of chi2 below which a step ends: the fit that begins here goes on
+_GAIN = 1e-3
 #: error with which a flight is flown, and how high above the ground, where it never ends, m
-_TOLERANCE, _HIGH = 1e-6, 1e4
+_TOLERANCE, _HIGH = 1e-5, 1e4
 #: what a flight costs, in standard deviations a number, that cannot be flown
 _NO_FLIGHT = 30.0
 
@@ -150,4 +152,6 @@ def _unlike(found: list[FloatArray]) -> list[FloatArray]:
 
 def _least(path: _Path, x: FloatArray, sd: float) -> Any:
     left = partial(path.left, sd=sd)
-    return least_squares(left, x, diff_step=[_STEP] * x.size, max_nfev=_TRIES, x_scale=_SCALES, loss="soft_l1")
+    return least_squares(
+        left, x, diff_step=[_STEP] * x.size, max_nfev=_TRIES, x_scale=_SCALES, loss="soft_l1", ftol=_GAIN, xtol=_GAIN
+    )

@@ -193,6 +193,8 @@ def _rows(starts: InitialStates, ratio: float) -> FloatArray:
 
 
 def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
+    if begins_open(recording):
+        return ()  # how its path bends tells how it stood
     return flight_initial_states(recording, np.zeros(1)).ambiguous
 
 
