@@ -95,7 +95,8 @@ def usable(recording: Recording) -> Usable:
     notes += [f"{sensor} left out: {reason}" for sensor, reason in gone.items()]
     if not set(kept) & set(LARGEST):
         why = "; ".join(f"{sensor}: {reason}" for sensor, reason in gone.items()) or f"none of {', '.join(LARGEST)}"
-        raise InputError(f"{recording.path or recording.name}: no sensor that shows a spin ({why})")
+        path = "; a path tells a spin by how it bends: discsim diagnose" * ("track" in kept)
+        raise InputError(f"{recording.path or recording.name}: no sensor that shows a spin ({why}){path}")
     changed = gone or any(kept[sensor] is not recording.samples[sensor] for sensor in kept)
     left = replace(recording, samples=kept) if changed else recording
     return Usable(left, gone, notes + clipping_notes(left))
