@@ -87,6 +87,7 @@ def test_a_path_is_read_as_a_flights_track(tmp_path, name: str, written: Callabl
     assert_allclose(again.need("track").value, track.value)
     assert again.release is not None
     assert again.release.velocity is None
+    assert again.environment.sigma["gravity_m_s2"] == 0.015
 
 
 @pytest.mark.parametrize(

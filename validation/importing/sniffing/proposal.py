@@ -24,6 +24,7 @@ __all__ = ["Proposal", "ProposedSensor", "map_text"]
 
 _COMMA = 'separator = ","'
 _AIR = (
+    "gravity_sigma_m_s2 = 0.015 # 9.780 at the equator to 9.832 at the poles: leave out where yours is written",
     "air_density_kg_m3 = 1.204 # dry air at 20 degC and 1013 hPa: write that of your day",
     "# wind_ned_m_s = [0.0, 0.0, 0.0] # where known",
 )
