@@ -124,6 +124,7 @@ def test_throws_in_a_folder_are_tracks_each(tmp_path):
         ("t,x,y,z\n" + rows(np.column_stack([T, np.sin(60 * T), np.cos(60 * T), T])), "no sensor of motion found"),
         ("Trajectories\nrate\nFrame,Sub Frame\n", "breaks off in its head"),
         ("NO_OF_FRAMES\t0\nFREQUENCY\t120\n", "breaks off in its head"),
+        (vicon().replace("\n120\n", "\n0\n"), "0 frames a second"),
     ],
 )
 def test_what_is_no_path_in_metres_is_refused_by_what_it_lacks(tmp_path, text, said):

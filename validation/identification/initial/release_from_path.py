@@ -37,6 +37,8 @@ _HOPELESS = 8.0
 _ONE_AXIS, _ONE_SPIN = 0.02, 2.0
 #: ordinary throws: rates across the axis and spin, rad/s; speed across what a single camera sees, m/s
 _WOBBLE, _SPIN, _UNSEEN = 3.0, 80.0, 2.0
+#: numbers by which a throw may be unusual: tilt, incidence, two rates across, spin, velocity
+_OF_THROWS = 8
 _SCALES = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5, 0.1, 0.1, 0.5, 0.5, 10.0)
 _STEP, _TRIES = 1e-4, 15
 #: share of chi2 below which a step ends: the fit that begins here goes on
@@ -123,7 +125,7 @@ class _Path:
         try:
             motion = self.flown(x, float(self.t[-1] - self.t[0]) + GRID).at(self.t - self.t[0])
         except InputError:
-            return np.full(np.count_nonzero(self.seen) + 10, _NO_FLIGHT)
+            return np.full(np.count_nonzero(self.seen) + _OF_THROWS, _NO_FLIGHT)
         off = (motion.position + np.array([0.0, 0.0, _HIGH]) - self.points)[self.seen] / sd
         axis = body_to_ned(motion.attitude[:1])[0, :, 2]
         speed = max(float(np.linalg.norm(x[3:6])), 1e-9)
@@ -133,8 +135,6 @@ class _Path:
             *(x[8:10] / _WOBBLE),
             (abs(x[10]) - _SPINS[1]) / _SPIN,
             *np.where(self.flat, x[3:6] / _UNSEEN, 0.0),
-            0.0,
-            0.0,
         ]
         return np.asarray(np.nan_to_num(np.concatenate([off, unusual]), nan=_NO_FLIGHT))
 

@@ -12,6 +12,8 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 from discsim.errors import InputError
 from discsim.validation.importing.sniffing.other_forms.written import (
     MAX_BYTES,
@@ -70,6 +72,8 @@ def write_tables(raw: Path, target: Path) -> list[str]:
         with raw.open(encoding=encoding, errors="replace", newline="") as stream:
             rows = list(csv.reader(stream, delimiter="\t" if read is _qualisys else ","))
         points = read([[cell.strip() for cell in row] for row in rows])
+        if points.time is None and not 0.0 < points.rate < np.inf:
+            raise ValueError(f"{points.rate:g} frames a second")
     except (OSError, ValueError, LookupError, csv.Error, StopIteration) as error:
         what = f"is a motion capture's export that breaks off in its head ({error or type(error).__name__})"
         raise InputError.at(raw, None, f"{what}; expected its lines of names and rates, and rows below") from None
