@@ -14,7 +14,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.validation.importing.sniffing.other_forms.markers import middle_of
 from discsim.validation.importing.sniffing.other_forms.written import (
     MAX_BYTES,
     check_size,
@@ -25,6 +27,8 @@ from discsim.validation.importing.sniffing.other_forms.written import (
 __all__ = ["begins", "write_tables"]
 
 Cells: TypeAlias = Sequence[str]
+#: How the point is called that the markers of one body turn about.
+_MIDDLE = "middle"
 _METRES = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 
 
@@ -81,11 +85,26 @@ def write_tables(raw: Path, target: Path) -> list[str]:
         raise InputError.at(
             raw, None, "holds no position of a rigid body or marker; export positions, in a global frame"
         )
-    names = [f"{name} {axis} ({points.unit})" for name in points.columns for axis in "xyz"]
-    table = [[time, *_place(points, row)] for time, row in _timed(points)]
-    target.write_text(comma_separated([["time_s", *names], *table]), encoding="utf-8")
+    names, table = list(points.columns), [[time, *_place(points, row)] for time, row in _timed(points)]
     turned = "; its y axis is up: here z is that, and y its -z" * points.up_is_y
-    return [f"{raw.name}: a motion capture's export; read: {', '.join(points.columns)}{turned}"]
+    said = [f"{raw.name}: a motion capture's export; read: {', '.join(names)}{turned}"]
+    if len(names) > 2 and (middle := middle_of(_numbers(table))) is not None:
+        names = [_MIDDLE, *names]
+        table = [
+            [time, *("" if np.isnan(cell) else f"{cell:.9g}" for cell in place), *cells]
+            for (time, *cells), place in zip(table, middle.path, strict=True)
+        ]
+        arm = f"{middle.arm:.4g} {points.unit} from {names[1]}"
+        said.append(f"{raw.name}: its points are one body; what they turn about is '{_MIDDLE}', {arm}")
+    columns = [f"{name} {axis} ({points.unit})" for name in names for axis in "xyz"]
+    target.write_text(comma_separated([["time_s", *columns], *table]), encoding="utf-8")
+    return said
+
+
+def _numbers(table: Sequence[Cells]) -> FloatArray:
+    """Return the places (n, m, 3) of rows of a time and cells; NaN where one was not seen."""
+    value = np.array([[float(cell) if _is_number(cell) else np.nan for cell in row[1:]] for row in table])
+    return value.reshape(len(table), -1, 3)
 
 
 def _timed(points: _Points) -> Iterator[tuple[str, Cells]]:
