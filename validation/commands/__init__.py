@@ -10,7 +10,7 @@ __all__ = ["COMMANDS", "register"]
 
 #: name on the command line -> module in this package, and the first line of its help
 COMMANDS: dict[str, tuple[str, str]] = {
-    "import": ("import_", "Turn a raw logger file into a recording folder."),
+    "import": ("import_", "Turn a logger's file or a camera's track into a recording."),
     "check": ("check", "Say what a recording holds, and what is wrong with it."),
     "diagnose": (
         "diagnose",

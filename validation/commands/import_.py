@@ -57,7 +57,7 @@ def command(
     place: PlaceOption = None,
     date: DateOption = None,
 ) -> None:
-    """Turn a raw logger file into a recording folder.
+    """Turn a logger's file or a camera's track into a recording.
 
     Writes recording.toml, one CSV file per sensor, repairs.csv (what was repaired or left out, by line) and raw.html
     (all traces, the throws found, the map with its reasons) into --out; without --map also the map that it proposes,
