@@ -28,6 +28,7 @@ __all__ = [
     "flip_yz",
     "heading_angles",
     "multiply",
+    "nearest_rotations",
     "quaternion_from_euler",
     "quaternion_from_matrix",
     "rotation_error",
@@ -166,6 +167,19 @@ def rotation_vector(q: FloatArray) -> FloatArray:
 def conjugate(q: FloatArray) -> FloatArray:
     """Return the inverse of unit quaternions (..., 4)."""
     return np.multiply(q, [1.0, -1.0, -1.0, -1.0])
+
+
+def nearest_rotations(K: FloatArray) -> FloatArray:
+    """Return the rotations (..., 3, 3) nearest to matrices (..., 3, 3), sums of outer products a b: they take b to a.
+
+    So Wahba's problem (SIAM Review 7, 1965) is solved by singular values (Kabsch, Acta Crystallogr. A32:922, 1976).
+
+    >>> nearest_rotations(2.0 * np.eye(3)) @ np.array([1.0, 2.0, 3.0])
+    array([1., 2., 3.])
+    """
+    U, _, Vt = np.linalg.svd(K)
+    U[..., 2] *= np.linalg.det(U @ Vt)[..., None]
+    return np.asarray(U @ Vt)
 
 
 def rotation_error(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -15,7 +15,15 @@ from scipy.integrate import cumulative_trapezoid
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.compiled import compiled
 from discsim.disc import Release
-from discsim.frames import attitude_matrix, body_to_ned, multiply, quaternion_from_matrix, rotation_vector, turn
+from discsim.frames import (
+    attitude_matrix,
+    body_to_ned,
+    multiply,
+    nearest_rotations,
+    quaternion_from_matrix,
+    rotation_vector,
+    turn,
+)
 from discsim.recording import Recording
 from discsim.validation.identification.initial.smoothing import (
     GRID,
@@ -264,9 +272,9 @@ def _fitted_turns(
     turns = np.empty((0, 3, 3))
     for width in (3 * sigma, 2 * sigma, sigma):
         K = _pairs(m, f, field, force, say)
-        whole = _rotations(np.sum(K, axis=0, keepdims=True))
+        whole = nearest_rotations(np.sum(K, axis=0, keepdims=True))
         # the force alone leaves a turn about itself, which only its motion over the whole flight tells
-        turns = _rotations(windowed(K, width) + (0.05 * whole if m is None else 1e-6 * whole))
+        turns = nearest_rotations(windowed(K, width) + (0.05 * whole if m is None else 1e-6 * whole))
         turned = np.einsum("nij,nj->ni", turns, f)
         apart = np.linalg.norm(np.cross(turned, force), axis=1) / np.maximum(
             np.linalg.norm(f, axis=1) * np.linalg.norm(force, axis=1), 1e-9
@@ -346,12 +354,6 @@ def _pairs(m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatA
     return np.asarray(K)
 
 
-def _rotations(K: FloatArray) -> FloatArray:
-    U, _, Vt = np.linalg.svd(K)
-    U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
-    return np.asarray(U @ Vt)
-
-
 def _weights(n: int, sigma: float) -> FloatArray:
     index = GRID * np.arange(n)
     W = np.exp(-0.5 * ((index[:, None] - index[None, :]) / sigma) ** 2)
@@ -370,7 +372,7 @@ def _level_about(v: FloatArray, reference: FloatArray, axis: FloatArray) -> Floa
     # the cross products decide the turn about v and leave v itself alone
     a, b = np.cross(reference, down), np.cross(v, axis)
     K = K + 1e-3 * np.outer(a, b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-9)
-    return np.asarray(_rotations(K[None] + 1e-9 * np.eye(3))[0])
+    return np.asarray(nearest_rotations(K[None] + 1e-9 * np.eye(3))[0])
 
 
 def _connected(turns: FloatArray, field: FloatArray) -> FloatArray:

@@ -46,14 +46,13 @@ from discsim.validation.identification.initial.release_from_field import release
 from discsim.validation.identification.initial.release_from_forces import Told, release_from_forces
 from discsim.validation.identification.initial.release_from_path import release_from_path
 from discsim.validation.identification.initial.smoothing import GRID
+from discsim.validation.identification.initial.trial_flights import DOWN
 
 __all__ = ["InitialStates", "begins_open", "flight_initial_states", "flight_starts", "spin_initial_states"]
 
 
 #: sensors that fly with the disc
 ON_BOARD = ("magnetometer", "gyroscope", "accelerometer")
-#: how much higher a predicted start is flown than it was thrown, m
-HIGH = 1e4
 
 
 class InitialStates(NamedTuple):
@@ -142,14 +141,13 @@ def _predicted(recording: Recording, t: FloatArray) -> InitialStates | None:
     if release is None or release.position is None or disc is None:
         return None
     # the ground is no end to a start: flown high above it, where the baseline's air is the same
-    high = np.array([0.0, 0.0, -HIGH])
     try:
-        aloft = replace(release, position=release.position + high)
+        aloft = replace(release, position=release.position - DOWN)
         flight = predict(disc, recording.environment, aloft, duration=float(np.max(t, initial=0.0)) + GRID)
     except InputError:
         return None
     at = flight.at(np.maximum(t, 0.0))
-    return InitialStates(t, at.position - high, at.velocity, at.attitude, at.rate, ())
+    return InitialStates(t, at.position + DOWN, at.velocity, at.attitude, at.rate, ())
 
 
 def spin_initial_states(recording: Recording, t: FloatArray) -> InitialStates:

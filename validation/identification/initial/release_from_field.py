@@ -11,23 +11,30 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from discsim.arrays import FloatArray
-from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.frames import body_to_ned, euler_angles, multiply, to_body, turn
 from discsim.recording import Recording
-from discsim.trajectory import Flight, predict
+from discsim.trajectory import Flight
 from discsim.validation.identification.initial.attitude import Attitude, states_from
 from discsim.validation.identification.initial.path import GUESSED_HEIGHT
-from discsim.validation.identification.initial.release_from_forces import ELEVATION, INCIDENCE, MOST, SPEED, TILT
+from discsim.validation.identification.initial.release_from_forces import ELEVATION, MOST, SPEED
 from discsim.validation.identification.initial.smoothing import GRID, Readings
+from discsim.validation.identification.initial.trial_flights import (
+    DOWN,
+    HOPELESS,
+    NO_FLIGHT,
+    Flown,
+    fitted,
+    flown_high,
+    unusual_axis,
+    within,
+)
 
-__all__ = ["Flown", "release_from_field"]
+__all__ = ["release_from_field"]
 
 #: what smoothing leaves, but at the ends, of the cosine between axis and field and of the spin rate, rad/s, with 0.7 uT
 #: of noise
@@ -37,30 +44,15 @@ _TURNS, _AZIMUTHS = 12, 12
 _INCIDENCES, _SPEEDS = (0.0, 0.15), (11.0, 16.0, 23.0)
 #: starts tilted or rising beyond this are none of throws, rad
 _STEEPEST, _RISING = 1.3, 0.7
-#: starts whose turn and azimuth part by less, rad, are one; how many are fitted, in steps of what size, and how often
-_BESIDE, _FITTED, _TRIES = 0.6, 10, 15
+#: starts whose turn and azimuth part by less, rad, are one; how many are fitted
+_BESIDE, _FITTED = 0.6, 10
 #: noise, uT, in which a flight is fitted to the field's three axes, one after the other; readings that take part
 _NARROWER, _READINGS = (10.0, 3.0, 1.0), 250
-#: flights whose velocities part by less, m/s, are one; half of chi2 by which one that is worse is not followed: 4 sd
-_ONE, _HOPELESS = 0.5, 8.0
+#: flights whose velocities part by less, m/s, are one
+_ONE = 0.5
 _SCALES = (0.3, 0.3, 0.1, 0.15, 0.3, 0.3, 0.3, 0.03)
-#: step of the differences that stand for derivatives, as a share of a number
-_STEP = 1e-4
-#: error with which a flight is flown, and how high above the ground, where it never ends, m
-_TOLERANCE, _HIGH = 1e-5, 1e4
 #: sine between axis and field below which the turn between them has no axis
 _LEAST = 1e-6
-#: what a flight costs, in standard deviations a number, that cannot be flown
-_NO_FLIGHT = 30.0
-
-
-class Flown(NamedTuple):
-    """States of a flight: position (k, 3) m and velocity (k, 3) m/s in N, attitude (k, 4), rate (k, 3) rad/s in B."""
-
-    position: FloatArray
-    velocity: FloatArray
-    attitude: FloatArray
-    rate: FloatArray
 
 
 def release_from_field(
@@ -78,11 +70,11 @@ def release_from_field(
     if grid[-1] - grid[0] < 3 * GRID:
         return ()
     seen = _Seen(recording, frame, frame.field, np.arange(grid[0], grid[-1], GRID), grid, G)
-    found = [np.append(_least(seen.slow, x, _SCALES).x, 0.0) for x in _best(seen.slow, seen.tried())]
+    found = [np.append(fitted(seen.slow, x, _SCALES).x, 0.0) for x in _best(seen.slow, seen.tried())]
     for sd in _NARROWER:
-        fits = [_least(partial(seen.whole, sd=sd), x, (*_SCALES, _SCALES[0])) for x in _unlike(found)]
+        fits = [fitted(partial(seen.whole, sd=sd), x, (*_SCALES, _SCALES[0])) for x in _unlike(found)]
         fits.sort(key=lambda fit: fit.cost)
-        found = [fit.x for fit in fits if fit.cost < fits[0].cost + _HOPELESS]
+        found = [fit.x for fit in fits if fit.cost < fits[0].cost + HOPELESS]
     after = np.maximum(t - seen.t[0], 0.0)
     read = states_from(recording, frame, grid, G, t)
     told = list[Flown]()
@@ -122,18 +114,8 @@ class _Seen:
         """Return the baseline's flight of numbers (8,) or more, over ``duration`` s."""
         begun = multiply(turn(x[7] * self.across), self.first)
         roll, pitch, yaw = euler_angles(multiply(turn(x[0] * self.n), begun))
-        release = Release(
-            position=np.array([0.0, 0.0, -_HIGH - GUESSED_HEIGHT]),
-            velocity=_velocity(x[1:4]),
-            roll=float(roll),
-            pitch=float(pitch),
-            yaw=float(yaw),
-            body_rate=np.array([x[4], x[5], self.rate[0] + x[6]]),
-        )
-        disc = self.recording.disc
-        assert disc is not None
-        environment = self.recording.environment
-        return predict(disc, environment, release, duration=duration, rtol=_TOLERANCE, atol=_TOLERANCE)
+        position, rate = np.array([0.0, 0.0, -GUESSED_HEIGHT]), np.array([x[4], x[5], self.rate[0] + x[6]])
+        return flown_high(self.recording, position, _velocity(x[1:4]), (roll, pitch, yaw), rate, duration)
 
     def slow(self, x: FloatArray) -> FloatArray:
         """Return what numbers (8,) leave of cosine and spin rate, in standard deviations.
@@ -143,13 +125,13 @@ class _Seen:
         try:
             motion = self.flown(x, self.t[-1] - self.t[0]).at(self.t - self.t[0])
         except InputError:
-            return np.full(2 * self.t.size + 4, _NO_FLIGHT)
+            return np.full(2 * self.t.size + 4, NO_FLIGHT)
         axis = body_to_ned(motion.attitude)[:, :, 2]
         field = to_body(motion.attitude, self.n)
         turned = -np.diff(np.arctan2(field[:, 1], field[:, 0])) - GRID * 0.5 * (self.rate[1:] + self.rate[:-1])
         slips = (np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi) / GRID
         off = [(axis @ self.n - self.cosine) / _COSINE, slips / _RATE]
-        return _within(np.concatenate([*off, self._unusual(axis[0], _velocity(x[1:4]))]))
+        return within(np.concatenate([*off, self._unusual(axis[0], _velocity(x[1:4]))]))
 
     def whole(self, x: FloatArray, sd: float) -> FloatArray:
         """Return what numbers (9,), the last an angle of the spin, rad, leave of readings with noise of ``sd`` uT."""
@@ -157,24 +139,20 @@ class _Seen:
         try:
             motion = self.flown(x, float(times[-1]) + GRID).at(times)
         except InputError:
-            return np.full(self.read.value.size + 5, _NO_FLIGHT)
+            return np.full(self.read.value.size + 5, NO_FLIGHT)
         shown = to_body(multiply(motion.attitude, turn(np.array([0.0, 0.0, x[8]]))), self.field)
         axis = body_to_ned(motion.attitude[:1])[0, :, 2]
         off = ((shown - self.read.value) / sd).ravel()
-        return _within(np.concatenate([off, self._unusual(axis, _velocity(x[1:4]))]))
+        return within(np.concatenate([off, self._unusual(axis, _velocity(x[1:4]))]))
 
     def _unusual(self, axis: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return how far from ordinary throws, or from what is stated, a start is, in standard deviations (5,)."""
         speed = float(np.linalg.norm(velocity))
-        told = [
-            (np.arccos(np.clip(axis[2], -1.0, 1.0)), TILT),
-            (np.arcsin(np.clip(velocity @ axis / speed, -1.0, 1.0)), INCIDENCE),
-        ]
         if self.stated is None:
-            told += [(speed, SPEED), (np.arcsin(-velocity[2] / speed), ELEVATION), (0.0, (0.0, 1.0))]
+            told = [(speed, SPEED), (np.arcsin(-velocity[2] / speed), ELEVATION), (0.0, (0.0, 1.0))]
         else:
-            told += [(one, (mean, self.sigma)) for one, mean in zip(velocity, self.stated, strict=True)]
-        return np.array([(value - mean) / sd for value, (mean, sd) in told])
+            told = [(one, (mean, self.sigma)) for one, mean in zip(velocity, self.stated, strict=True)]
+        return np.array([*unusual_axis(axis, velocity), *((value - mean) / sd for value, (mean, sd) in told)])
 
     def tried(self) -> Iterator[FloatArray]:
         """Yield numbers (8,) to try: ordinary throws, or the stated velocity, at turns about the field."""
@@ -194,14 +172,6 @@ class _Seen:
                     yield np.array([angle, *_numbers(speed * way), 0.0, 0.0, 0.0, 0.0])
 
 
-def _least(left: Callable[[FloatArray], FloatArray], x: FloatArray, scales: Sequence[float]) -> Any:
-    return least_squares(left, x, diff_step=[_STEP] * x.size, max_nfev=_TRIES, x_scale=scales, loss="soft_l1")
-
-
-def _within(off: FloatArray) -> FloatArray:
-    return np.asarray(np.nan_to_num(off, nan=_NO_FLIGHT, posinf=_NO_FLIGHT, neginf=-_NO_FLIGHT))
-
-
 def _unlike(found: Sequence[FloatArray]) -> list[FloatArray]:
     """Return numbers (9,) without those that end where better ones do."""
     kept: list[FloatArray] = []
@@ -214,7 +184,7 @@ def _unlike(found: Sequence[FloatArray]) -> list[FloatArray]:
 def _best(left: Callable[[FloatArray], FloatArray], tried: Iterator[FloatArray]) -> list[FloatArray]:
     """Return the best of starts (8,) that are not beside one another."""
     found: list[FloatArray] = []
-    for x in sorted(tried, key=lambda x: float(np.sum(np.minimum(np.abs(left(x)), _NO_FLIGHT) ** 2))):
+    for x in sorted(tried, key=lambda x: float(np.sum(np.minimum(np.abs(left(x)), NO_FLIGHT) ** 2))):
         apart = [np.remainder(x[:2] - other[:2] + np.pi, 2.0 * np.pi) - np.pi for other in found]
         if not any(np.all(np.abs(off) < _BESIDE) for off in apart):
             found.append(x)
@@ -247,4 +217,4 @@ def _beside(flight: Flight, t: FloatArray, read: tuple[FloatArray, FloatArray], 
     attitude = multiply(motion.attitude, turn(ahead[:, None] * np.array([0.0, 0.0, 1.0])))
     across = (motion.rate[:, 0] + 1j * motion.rate[:, 1]) * np.exp(-1j * ahead)
     rate = np.column_stack([across.real, across.imag, read[1][:, 2]])
-    return Flown(motion.position + np.array([0.0, 0.0, _HIGH]), motion.velocity, attitude, rate)
+    return Flown(motion.position + DOWN, motion.velocity, attitude, rate)

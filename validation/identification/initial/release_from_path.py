@@ -9,21 +9,27 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import partial
-from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from discsim.arrays import FloatArray
-from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.frames import body_to_ned
 from discsim.recording import Recording
-from discsim.trajectory import Flight, predict
+from discsim.trajectory import Flight
 from discsim.validation.identification.initial.path import Fixes, local_cubics, normals_of
-from discsim.validation.identification.initial.release_from_field import Flown
-from discsim.validation.identification.initial.release_from_forces import INCIDENCE, MOST, TILT
+from discsim.validation.identification.initial.release_from_forces import MOST
 from discsim.validation.identification.initial.smoothing import GRID
+from discsim.validation.identification.initial.trial_flights import (
+    DOWN,
+    HOPELESS,
+    NO_FLIGHT,
+    Flown,
+    fitted,
+    flown_high,
+    unusual_axis,
+    within,
+)
 
 __all__ = ["release_from_path"]
 
@@ -31,8 +37,6 @@ __all__ = ["release_from_path"]
 _SPINS = (30.0, 60.0, 110.0)
 #: what is left of a path while it is fitted, m, one after the other, before its own noise; points that take part
 _NARROWER, _POINTS = (0.3, 0.05), 120
-#: half of chi2 by which a flight that is worse is not followed: 4 sd
-_HOPELESS = 8.0
 #: flights whose axes part by less, rad, and whose spins by less, rad/s, are one
 _ONE_AXIS, _ONE_SPIN = 0.02, 2.0
 #: ordinary throws: rates across the axis and spin, rad/s; speed across what a single camera sees, m/s
@@ -40,13 +44,8 @@ _WOBBLE, _SPIN, _UNSEEN = 3.0, 80.0, 2.0
 #: numbers by which a throw may be unusual: tilt, incidence, two rates across, spin, velocity
 _OF_THROWS = 8
 _SCALES = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5, 0.1, 0.1, 0.5, 0.5, 10.0)
-_STEP, _TRIES = 1e-4, 15
 #: share of chi2 below which a step ends: the fit that begins here goes on
 _GAIN = 1e-3
-#: error with which a flight is flown, and how high above the ground, where it never ends, m
-_TOLERANCE, _HIGH = 1e-5, 1e4
-#: what a flight costs, in standard deviations a number, that cannot be flown
-_NO_FLIGHT = 30.0
 
 
 def release_from_path(recording: Recording, t: FloatArray) -> tuple[Flown, ...]:
@@ -68,15 +67,15 @@ def release_from_path(recording: Recording, t: FloatArray) -> tuple[Flown, ...]:
     seen = _Path(recording, samples.t[here][::every], points[here][::every])
     found = [x for spin in _SPINS for x in (seen.start(spin), seen.start(-spin))]
     for sd in (*_NARROWER, sheet.noise_rms or _NARROWER[-1]):
-        fits = sorted((_least(seen, x, sd) for x in found), key=lambda fit: float(fit.cost))
-        found = _unlike([fit.x for fit in fits if fit.cost < fits[0].cost + _HOPELESS])
+        left = partial(seen.left, sd=sd)
+        fits = sorted((fitted(left, x, _SCALES, _GAIN) for x in found), key=lambda fit: float(fit.cost))
+        found = _unlike([fit.x for fit in fits if fit.cost < fits[0].cost + HOPELESS])
     after = np.maximum(t - seen.t[0], 0.0)
     told: list[Flown] = []
     for x in found[:MOST]:
         with suppress(InputError):  # beyond the last point a flight may end that did not before
             motion = seen.flown(x, float(after.max()) + GRID).at(after)
-            down = np.array([0.0, 0.0, _HIGH])
-            told.append(Flown(motion.position + down, motion.velocity, motion.attitude, motion.rate))
+            told.append(Flown(motion.position + DOWN, motion.velocity, motion.attitude, motion.rate))
     return tuple(told)
 
 
@@ -91,7 +90,7 @@ class _Path:
         self.recording, self.t, self.points = recording, t, points
         self.seen = np.isfinite(points)
         self.flat = ~self.seen.any(axis=0)
-        level = np.where(self.flat, 0.0, np.nanmedian(np.where(self.flat, 0.0, points), axis=0))
+        level = np.nanmedian(np.where(self.flat, 0.0, points), axis=0)
         nothing = np.full(points.shape, np.nan)
         fixes = Fixes(t, np.where(self.seen, points, level), nothing, 0.05, 0.1)
         self.cubic = local_cubics(fixes, t[:1])[0]
@@ -107,36 +106,23 @@ class _Path:
 
     def flown(self, x: FloatArray, duration: float) -> Flight:
         """Return the baseline's flight of numbers (11,) over ``duration`` s, high above the ground."""
-        release = Release(
-            position=x[:3] - np.array([0.0, 0.0, _HIGH]),
-            velocity=x[3:6],
-            roll=float(x[6]),
-            pitch=float(x[7]),
-            yaw=0.0,
-            body_rate=x[8:],
-        )
-        disc = self.recording.disc
-        assert disc is not None
-        environment = self.recording.environment
-        return predict(disc, environment, release, duration=duration, rtol=_TOLERANCE, atol=_TOLERANCE)
+        return flown_high(self.recording, x[:3], x[3:6], (*x[6:8], 0.0), x[8:], duration)
 
     def left(self, x: FloatArray, sd: float) -> FloatArray:
         """Return what numbers (11,) leave of the points with noise of ``sd`` m, in standard deviations."""
         try:
             motion = self.flown(x, float(self.t[-1] - self.t[0]) + GRID).at(self.t - self.t[0])
         except InputError:
-            return np.full(np.count_nonzero(self.seen) + _OF_THROWS, _NO_FLIGHT)
-        off = (motion.position + np.array([0.0, 0.0, _HIGH]) - self.points)[self.seen] / sd
+            return np.full(np.count_nonzero(self.seen) + _OF_THROWS, NO_FLIGHT)
+        off = (motion.position + DOWN - self.points)[self.seen] / sd
         axis = body_to_ned(motion.attitude[:1])[0, :, 2]
-        speed = max(float(np.linalg.norm(x[3:6])), 1e-9)
         unusual = [
-            (np.arccos(np.clip(axis[2], -1.0, 1.0)) - TILT[0]) / TILT[1],
-            (np.arcsin(np.clip(x[3:6] @ axis / speed, -1.0, 1.0)) - INCIDENCE[0]) / INCIDENCE[1],
+            *unusual_axis(axis, x[3:6]),
             *(x[8:10] / _WOBBLE),
             (abs(x[10]) - _SPINS[1]) / _SPIN,
             *np.where(self.flat, x[3:6] / _UNSEEN, 0.0),
         ]
-        return np.asarray(np.nan_to_num(np.concatenate([off, unusual]), nan=_NO_FLIGHT))
+        return within(np.concatenate([off, unusual]))
 
 
 def _unlike(found: list[FloatArray]) -> list[FloatArray]:
@@ -148,10 +134,3 @@ def _unlike(found: list[FloatArray]) -> list[FloatArray]:
         ):
             kept.append(x)
     return kept
-
-
-def _least(path: _Path, x: FloatArray, sd: float) -> Any:
-    left = partial(path.left, sd=sd)
-    return least_squares(
-        left, x, diff_step=[_STEP] * x.size, max_nfev=_TRIES, x_scale=_SCALES, loss="soft_l1", ftol=_GAIN, xtol=_GAIN
-    )

@@ -18,7 +18,7 @@ from discsim.validation.importing.sniffing.fixes import ProposedFixes
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
 from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.own_place import OwnPlace
-from discsim.validation.importing.sniffing.track import DISC, SPIN, WOBBLE, ProposedTrack
+from discsim.validation.importing.sniffing.track import SPIN, WOBBLE, ProposedTrack
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
 
@@ -131,7 +131,7 @@ def map_text(proposal: Proposal) -> str:
             lines.append(f"step_sigma_s = {clock.step * clock.off:.2g} # leave out where the step is known")
         lines += [f"counter = {_text(name)}" for name in [clock.counter] if name is not None]
     if proposal.track is not None:
-        lines += ["", "[disc]", _remark(proposal.track.of_disc), f"name = {_text(DISC)}"]
+        lines += ["", "[disc]", _remark(proposal.track.of_disc), f"name = {_text(proposal.track.of_disc.choice)}"]
     lines += [
         "",
         "[environment]",

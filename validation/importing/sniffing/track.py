@@ -19,7 +19,7 @@ from discsim.validation.importing.sniffing.decision import Decision, Sureness
 from discsim.validation.importing.sniffing.groups import Numbers
 from discsim.validation.importing.sniffing.names import Name, is_time_name, read_name, words_of
 
-__all__ = ["DISC", "SPIN", "WOBBLE", "ProposedTrack", "coordinates_of", "track_of"]
+__all__ = ["SPIN", "WOBBLE", "ProposedTrack", "coordinates_of", "track_of"]
 
 #: Rows of a track: fewer are no path.
 _FEWEST = 8
@@ -32,7 +32,7 @@ _ORDER, _SMOOTH = 5, 0.05
 #: Rooms for motion capture are known to a tenth of a millimetre (their makers state 0.1 to 0.2 mm).
 _FINEST = 1e-4
 #: The disc that is taken where none is stated: that of Ultimate.
-DISC = "ultrastar"
+_DISC = "ultrastar"
 #: What throws are like, one sigma, rad/s: rates across the axis at release (an allowance, as that of the golf throws'
 #: map, for nobody measures them), and the spin to either side (Ultimate's 30 to 90, golf's 90 to 160).
 WOBBLE, SPIN = 5.0, 100.0
@@ -90,13 +90,15 @@ def track_of(tables: Sequence[Numbers], clock: Clock) -> ProposedTrack | None:
     Raises `InputError` where it is in pixels, or nothing tells the time of its rows.
     """
     for numbers in tables:
-        for axes in coordinates_of(numbers.names):
-            if (track := _track(numbers, axes, clock)) is not None:
+        points = coordinates_of(numbers.names)
+        for axes in points:
+            if (track := _track(numbers, axes, clock, len(points) - 1)) is not None:
                 return track
     return None
 
 
-def _track(numbers: Numbers, axes: dict[int, int], clock: Clock) -> ProposedTrack | None:
+def _track(numbers: Numbers, axes: dict[int, int], clock: Clock, others: int) -> ProposedTrack | None:
+    """Return a point's track, beside which there are so many ``others``; None where it goes along no path."""
     order = sorted(axes)
     columns = [axes[axis] for axis in order]
     names = [numbers.names[k] for k in columns]
@@ -124,7 +126,6 @@ def _track(numbers: Numbers, axes: dict[int, int], clock: Clock) -> ProposedTrac
     sure: Sureness = "certain" if told else "guess"
     why = "its names say so" if told else "three or two columns under the names of axes that go along a smooth path"
     of_columns = Decision("track", ", ".join(written), sure, why)
-    others = len(coordinates_of(numbers.names)) - 1
     notes = (f"left out: {others} more tracked points: the first is taken for the disc's centre",) * bool(others)
     noise = max(scatter_of(metres), _FINEST)
     told_noise = float(f"{noise:.2g}")
@@ -167,5 +168,5 @@ def _turned(count: int) -> tuple[tuple[str, str, str], Decision]:
 
 
 def _disc() -> Decision:
-    others = ", ".join(name for name in model_names("discs") if name != DISC)
-    return Decision("disc", DISC, "guess", f"a flight needs a disc, and a track tells none; others shipped: {others}")
+    others = ", ".join(name for name in model_names("discs") if name != _DISC)
+    return Decision("disc", _DISC, "guess", f"a flight needs a disc, and a track tells none; others shipped: {others}")

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.frames import nearest_rotations
 
 __all__ = ["Middle", "middle_of"]
 
@@ -46,7 +47,7 @@ def middle_of(places: FloatArray) -> Middle | None:
         seen = np.isfinite(frame).all(axis=1)
         if np.count_nonzero(seen) > 2:
             own = body[seen].mean(axis=0)
-            turns[k] = _turn(body[seen] - own, frame[seen] - frame[seen].mean(axis=0))
+            turns[k] = nearest_rotations((frame[seen] - frame[seen].mean(axis=0)).T @ (body[seen] - own))
             origins[k] = frame[seen].mean(axis=0) - turns[k] @ own
     bends = np.diff(turns, 2, axis=0)
     told = np.isfinite(bends).all(axis=(1, 2))
@@ -55,10 +56,3 @@ def middle_of(places: FloatArray) -> Middle | None:
     off = np.linalg.lstsq(bends[told].reshape(-1, 3), -left.reshape(-1), rcond=_TOLD)[0]
     middle = centre + off
     return Middle(origins + turns @ middle, float(np.linalg.norm(body[0] - middle)))
-
-
-def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) that takes points (m, 3) about their mean to others best."""
-    u, _, v = np.linalg.svd(before.T @ after)
-    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(v.T @ u.T))])
-    return np.asarray(v.T @ mirror @ u.T)

@@ -6,7 +6,6 @@ no names; the points of QTM were taken for an accelerometer's and a magnetometer
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -16,12 +15,13 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.validation.importing.cell_texts import number
 from discsim.validation.importing.sniffing.other_forms.markers import middle_of
 from discsim.validation.importing.sniffing.other_forms.written import (
-    MAX_BYTES,
-    check_size,
+    all_rows,
     comma_separated,
     first_lines,
+    read_and_left,
 )
 
 __all__ = ["begins", "write_tables"]
@@ -70,15 +70,13 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     """
     read = _reader(raw)
     assert read is not None
-    check_size(raw, "a motion capture's export", MAX_BYTES)
     encoding, _ = first_lines(raw)
+    rows = all_rows(raw, encoding, "\t" if read is _qualisys else ",")
     try:
-        with raw.open(encoding=encoding, errors="replace", newline="") as stream:
-            rows = list(csv.reader(stream, delimiter="\t" if read is _qualisys else ","))
         points = read([[cell.strip() for cell in row] for row in rows])
         if points.time is None and not 0.0 < points.rate < np.inf:
             raise ValueError(f"{points.rate:g} frames a second")
-    except (OSError, ValueError, LookupError, csv.Error, StopIteration) as error:
+    except (ValueError, LookupError, StopIteration) as error:
         what = f"is a motion capture's export that breaks off in its head ({error or type(error).__name__})"
         raise InputError.at(raw, None, f"{what}; expected its lines of names and rates, and rows below") from None
     if not points.columns:
@@ -87,7 +85,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
         )
     names, table = list(points.columns), [[time, *_place(points, row)] for time, row in _timed(points)]
     turned = "; its y axis is up: here z is that, and y its -z" * points.up_is_y
-    said = [f"{raw.name}: a motion capture's export; read: {', '.join(names)}{turned}"]
+    said = [read_and_left(raw, "a motion capture's export", f"{', '.join(names)}{turned}", ())]
     if len(names) > 2 and (middle := middle_of(_numbers(table))) is not None:
         names = [_MIDDLE, *names]
         table = [
@@ -103,8 +101,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
 
 def _numbers(table: Sequence[Cells]) -> FloatArray:
     """Return the places (n, m, 3) of rows of a time and cells; NaN where one was not seen."""
-    value = np.array([[float(cell) if _is_number(cell) else np.nan for cell in row[1:]] for row in table])
-    return value.reshape(len(table), -1, 3)
+    return np.array([[_value(cell) for cell in row[1:]] for row in table]).reshape(len(table), -1, 3)
 
 
 def _timed(points: _Points) -> Iterator[tuple[str, Cells]]:
@@ -157,15 +154,15 @@ def _vicon(rows: list[Cells]) -> _Points:
         if name and [axis.upper() for axis in axes[k : k + 3]] == ["X", "Y", "Z"]
     }
     unit = next((cell for cell in units if cell), "mm")
-    end = next((k for k in range(start + 5, len(rows)) if not any(rows[k])), len(rows))
+    end = next((k for k in range(start + 5, len(rows)) if np.isnan(_value(rows[k][0]))), len(rows))
     return _Points(found, unit, rows[start + 5 : end], frame=0, rate=rate)
 
 
 def _qualisys(rows: list[Cells]) -> _Points:
     """Return the markers of a file of QTM, in mm; three noughts are a marker that was not seen."""
-    head = {row[0]: row[1:] for row in islice(rows, 40) if row and not _is_number(row[0])}
+    head = {row[0]: row[1:] for row in islice(rows, 40) if row and np.isnan(_value(row[0]))}
     names = [name for name in head["MARKER_NAMES"] if name]
-    first = next(k for k, row in enumerate(rows) if row and _is_number(row[0]))
+    first = next(k for k, row in enumerate(rows) if row and not np.isnan(_value(row[0])))
     table = rows[first:]
     lead = 2 if len([cell for cell in table[0] if cell]) == 3 * len(names) + 2 or "Frame" in head else 0
     found = {name: (lead + 3 * k, lead + 3 * k + 1, lead + 3 * k + 2) for k, name in enumerate(names)}
@@ -177,15 +174,13 @@ def _qualisys(rows: list[Cells]) -> _Points:
 def _seen(row: Cells, places: Sequence[tuple[int, int, int]]) -> Cells:
     cells = list(row)
     for columns in places:
-        if all(k < len(cells) and _is_number(cells[k]) and float(cells[k]) == 0.0 for k in columns):
+        if all(k < len(cells) and _value(cells[k]) == 0.0 for k in columns):
             for k in columns:
                 cells[k] = ""
     return cells
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+def _value(cell: str) -> float:
+    """Return a cell's number, NaN where it holds none."""
+    value = number(cell)
+    return float("nan") if value is None else value
