@@ -13,8 +13,8 @@ from discsim.validation.identification.propagation import place_in_flat
 
 #: the numbers of a row that an instrument shows, and how far of their parting they may be off
 SHOWN = {"q": (slice(9, 13), 0.01), "w": (slice(13, 16), 0.01), "dw": (slice(16, 19), 0.03)}
-#: how the wobble dies and turns
-WOBBLE = np.array([1.5, -0.5, -4.0, 1.0, 0.5, 0.2, -0.3, 0.1, 0.2, 0.3])
+#: how the wobble dies and turns, and what it does to the spin
+WOBBLE = np.array([1.5, -0.5, -4.0, 1.0, 0.5, 0.2, -0.3, 0.1, 0.2, 0.3, 0.8, -1.5, -0.4, 1.0])
 #: differences in each number of a state
 SIZES = [1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 0.0, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-3, 3e-3, 3e-3, 1e-2, 1e-2]
 

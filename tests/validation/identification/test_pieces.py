@@ -521,6 +521,7 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion(unbalanced: bool):
     columns = [
         Column(*FREE_SPIN.own_keys[0], 1e-3),
         Column(*FREE_SPIN.own_keys[3], 1e-3),
+        *(Column(*key, 1e-3) for key in FREE_SPIN.motion_keys[10:]),
         Column("body.inertia_asymmetry", "dIyy_kg_m2", 1e-7),
     ]
     linear = linearise(three, values, columns, np.zeros(d, dtype=np.bool_))
@@ -534,7 +535,9 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion(unbalanced: bool):
         ]
         assert_column(linear, linear.nuisance[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-3, k)
     for j, column in enumerate(columns):
-        assert_column(linear, linear.common[:, j], slope_of(one, values, column.key, column.step), 2e-3, column)
+        # what the wobble does to the spin turns with it, 0.7 rad in a long step
+        share = 1e-2 if column.name.startswith("spun_by") else 2e-3
+        assert_column(linear, linear.common[:, j], slope_of(one, values, column.key, column.step), share, column)
 
 
 def test_an_event_s_columns_are_the_same_whether_or_not_quiet_pieces_are_left_out(monkeypatch: pytest.MonkeyPatch):

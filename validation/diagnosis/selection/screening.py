@@ -86,9 +86,18 @@ def column_of(q: Parameter) -> Column:
 
 
 def normal_equations_of(
-    fit: Fit, candidates: Sequence[CandidateEffect], noise: NoiseModel, defects: AllowedDefects
+    fit: Fit,
+    candidates: Sequence[CandidateEffect],
+    noise: NoiseModel,
+    defects: AllowedDefects,
+    *,
+    some_astray: bool = False,
 ) -> NormalEquations:
-    """Take the columns of candidates and of a fit's own parameters where the fit stands, to the baseline of each."""
+    """Take the columns of candidates and of a fit's own parameters where the fit stands, to the baseline of each.
+
+    Raises `InputError` where a recording's motion leaves the numbers, or with ``some_astray`` where all do: far from
+    the data one may, and then says nothing.
+    """
     columns = columns_about(fit, candidates)
     place = {column: k for k, column in enumerate(columns)}
     allowing = replace(fit, defects=defects)
@@ -98,12 +107,14 @@ def normal_equations_of(
         return reduce(linearised_in(allowing, index, columns), fit.trajectories[index], noise, defects).gram
 
     grams = np.stack(mapped(gram, range(len(fit.trajectories))))
-    if not np.all(np.isfinite(grams)):
+    lost = ~np.isfinite(grams).all(axis=(1, 2))
+    if np.all(lost) if some_astray else np.any(lost):
         raise InputError(
             "diagnose: no motion of this plant follows the readings, its fit leaves the numbers "
             "(a free spin turns by itself, driven by nothing); expected the part of the log in which it does: "
             "discsim import RAW --throw N or --rows A:B takes it out"
         )
+    grams[lost] = 0.0
     to_baseline(grams, fit, [place[column_of(q)] for q in fit.parameters])
     return NormalEquations(columns, grams, place)
 

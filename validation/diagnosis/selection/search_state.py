@@ -116,7 +116,7 @@ class Search:
         """Return the search with its normal equations about a fit, which are worked out once."""
         if self.asked is fit:
             return self
-        equations = normal_equations_of(fit, self.candidates, fit.noise, fit.continuous_defects)
+        equations = normal_equations_of(fit, self.candidates, fit.noise, fit.continuous_defects, some_astray=True)
         return replace(self, equations=equations, asked=fit)
 
     def with_step(self, fitted: ContinuousFit) -> Search:

@@ -66,7 +66,8 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
 
 
 #: how the wobble dies (1/s) and turns (rad/s), how that differs along and across the wind, and their slopes in time:
-#: what the air may do at ordinary stiffness, one sigma
+#: what the air may do at ordinary stiffness, one sigma; and how much of what damps the rolling turns the spin, by rates
+#: about the north and the east: Ixx/Izz times the decay times the angle of attack, 0.5 * 5 1/s * 0.4 rad
 _WOBBLE = (
     *(
         Parameter(_NAME, f"{name}_{unit}", 0.0, 1e-3, sigma)
@@ -75,6 +76,11 @@ _WOBBLE = (
     ),
     Parameter(_NAME, "decay_1_s3", 0.0, 1e-3, 5.0),
     Parameter(_NAME, "turn_1_s3", 0.0, 1e-3, 10.0),
+    *(
+        Parameter(_NAME, f"spun_by_{axis}_{unit}", 0.0, 1e-3, sigma)
+        for axis in ("north", "east")
+        for unit, sigma in (("1_s", 1.0), ("1_s2", 2.0))
+    ),
 )
 
 

@@ -56,9 +56,11 @@ def _spinning(
 ) -> None:
     """Write the derivative of body rates w (3,) in a free spin into dw (3,): Euler's equations and the nuisances.
 
-    wobble (10,) is how fast the wobble dies, 1/s, how much faster it turns for the stiffness of the air, rad/s, and how
+    wobble (14,) is how fast the wobble dies, 1/s, how much faster it turns for the stiffness of the air, rad/s, and how
     both differ along the wind and across it (cosine and sine of twice the wind's direction), each with its change over
-    the first seconds. heading is that of x_B in N where psi is zero. Air is as stiff as the slope of its moment over
+    the first seconds; then how what damps the rolling acts on the spin, too: the moment stands aslant to the disc by
+    the angle of attack, so that rates about axes to the north and to the east make a yaw moment, 1/s, each with its
+    change. heading is that of x_B in N where psi is zero. Air is as stiff as the slope of its moment over
     the angle of attack, which need not be smooth: state[13] is what that adds in this segment, rad/s. A moment about
     one axis turns the wobble as much as it tells that axis from the other.
 
@@ -80,7 +82,8 @@ def _spinning(
     stiffer = 1.0 + state[13] * faster / (1.0 + faster * faster)
     faster += state[13]
     along, across = wobble[4] + later * wobble[5], wobble[6] + later * wobble[7]
-    c2, s2 = cos(2.0 * (psi + heading)), sin(2.0 * (psi + heading))
+    cn, sn = cos(psi + heading), sin(psi + heading)
+    c2, s2 = cn * cn - sn * sn, 2.0 * sn * cn
     a, b = along * c2 + across * s2, across * c2 - along * s2
     # the axis: a moment about one at the angle chi tells axes apart by -i k exp(2 i chi), and turns the wobble by k,
     # which has the sign opposite to the spin where the moment grows with the angle of attack
@@ -100,6 +103,8 @@ def _spinning(
     dw[1] += y * b * w[0] - y * a * w[1]
     dw[1] += y * py + y * uy * px - y * ux * py
     dw[2] = (Ixx - Iyy) / Izz * w[0] * w[1] + (state[4] + since * state[5]) * w[2]
+    dw[2] += (wobble[10] + later * wobble[11]) * (cn * w[0] - sn * w[1])
+    dw[2] += (wobble[12] + later * wobble[13]) * (sn * w[0] + cn * w[1])
     dw[2] += spin_step(p.event_spin_step, t, w[2])
 
 
@@ -114,7 +119,7 @@ def free_spin_segments(
     rows: FloatArray,
     ends: FloatArray,
 ) -> None:
-    """Spin freely from states (c, 18); wobbles (c, 10) as for `_spinning`. Else as `flight_segments`.
+    """Spin freely from states (c, 18); wobbles (c, 14) as for `_spinning`. Else as `flight_segments`.
 
     Neighbours of the first part from it as in long steps: to some thousandths of how far they part.
     """

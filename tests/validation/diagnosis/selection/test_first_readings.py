@@ -24,7 +24,7 @@ def test_first_readings_that_a_lag_leaves_out_are_no_gain_of_it():
     recording = record(motion, module, np.random.default_rng(4), plant="free_spin", name="noise", disc=DRIVER)
     samples, sd = recording.samples["gyroscope"], recording.sheets["gyroscope"].noise_rms
     value = samples.value.copy()
-    value[0, 2] += 8.0 * sd
+    value[0, 2] += 12.0 * sd
     recording = replace(recording, samples={**recording.samples, "gyroscope": Samples(samples.t, value)})
     fit, own = relaxed([recording]), unknowns([recording])
     noise = estimate_noise(fit.linears, [linear.residual for linear in fit.linears])

@@ -83,7 +83,7 @@ def step(
     monkeypatch.setattr(searching, "continuous_fit", told)
     monkeypatch.setattr(searching, "chi2_in", chi2)
     monkeypatch.setattr(finding, "chi2_in", chi2)
-    monkeypatch.setattr(finding, "normal_equations_of", lambda *_: None)
+    monkeypatch.setattr(finding, "normal_equations_of", lambda *_, **__: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
     ranked = [ScreenedCandidate(candidate, 1e6 - rank, {}) for rank, candidate in enumerate(RANKED)]
@@ -204,7 +204,7 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     monkeypatch.setattr(searching, "continuous_fit", told)
     monkeypatch.setattr(searching, "chi2_in", lambda fitted, noise: 1.1 * fitted.fit.count)
     monkeypatch.setattr(finding, "chi2_in", lambda fitted, noise: 1.1 * fitted.fit.count)
-    monkeypatch.setattr(finding, "normal_equations_of", lambda *_: None)
+    monkeypatch.setattr(finding, "normal_equations_of", lambda *_, **__: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
     monkeypatch.setattr(searching, "one_per_effect", lambda _: [ScreenedCandidate(tilt, 1e6, {size: 0.3})])
