@@ -100,3 +100,24 @@ def test_a_reading_that_rises_is_no_time(tmp_path, rise):
     mag = np.column_stack([rise * LOG.t + noise, LOG.mag[:, 1:]])
     columns = [("t_s", LOG.t), *three(["gx", "gy", "gz"], LOG.gyro), *three(["mx", "my", "mz"], mag)]
     assert import_log(write_table(tmp_path / "log.csv", columns)).recordings
+
+
+@pytest.mark.parametrize("worth", [1.0, 1.16])
+def test_forces_under_the_letter_g_alone_are_an_accelerometer_s(tmp_path, worth):
+    """A flight sensor wrote GX, GY, GZ for g: 9.5 deg/s at rest were called a gyroscope's, certainly."""
+    aslant = LOG.accel.copy()
+    aslant[: len(aslant) // 2] = np.roll(aslant[: len(aslant) // 2], 1, axis=1)  # it is picked up and laid on its side
+    names = ["GX", "GY", "GZ"]
+    columns = [("Zeit (ms)", np.round(1000 * LOG.t).astype(int)), *three(names, aslant / worth)]
+    whole = import_log(write_table(tmp_path / "log.csv", columns))
+    assert set(whole.recordings[0].samples) == {"accelerometer"}
+    (line,) = [note for note in whole.notes if "is taken as one" in note]
+    assert line.startswith("WARNING: GX, GY, GZ reads as an accelerometer (")
+    assert line.endswith('[sensors.gyroscope] columns = ["GX", "GY", "GZ"]')
+
+
+def test_a_gyroscope_under_the_letter_g_alone_is_one(tmp_path):
+    columns = [("Zeit (ms)", np.round(1000 * LOG.t).astype(int)), *three(["GX", "GY", "GZ"], LOG.gyro / DEG)]
+    whole = import_log(write_table(tmp_path / "log.csv", columns))
+    assert set(whole.recordings[0].samples) == {"gyroscope"}
+    assert not any("is taken as one" in note for note in whole.notes)

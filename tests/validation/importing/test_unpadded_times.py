@@ -49,6 +49,24 @@ def test_counted_parts_of_a_second_are_read_as_meant_and_it_is_said(tmp_path, fo
     assert (repair.line, repair.action) == (4, "read so from the first row on")
 
 
+@pytest.mark.parametrize("digits", [3, 4, 5])
+@pytest.mark.parametrize("form", ["12:00:{:02d}.{}", "{}.{}"])
+def test_microseconds_cut_to_their_first_digits_are_read_as_meant(tmp_path, form, digits):
+    """A CanSat's log was twice as long as it had lasted, 912 rows "lost"; the clock "went on by 1 s" each second."""
+    cells = [form.format(ms // 1000, str(1000 * (ms % 1000))[:digits]) for ms in MS]
+    found = import_log(log(tmp_path / "log.csv", "Time", cells))
+    assert_allclose(found.recordings[0].samples["gyroscope"].t, LOG.t, atol=1e-6)
+    assert f"the beginning ({digits} digits) of a count of 1000000, without zeros before it" in found.summary()
+    (throw,) = found.throws
+    assert RELEASE <= throw.start < throw.end <= LANDING + 0.1
+
+
+def test_a_clock_that_is_set_back_is_no_cut_count():
+    times = np.concatenate([np.arange(0.0, 4.0, 0.01), np.arange(3.5, 7.0, 0.01), np.arange(6.0, 9.0, 0.01)])
+    cells = [repr(round(t, 4)) for t in times.tolist()]
+    assert unpadded(CellTexts(packed(cells)), np.array(cells, dtype=float)) is None
+
+
 def test_a_map_that_does_not_allow_it_refuses_with_the_line(tmp_path):
     raw = log(tmp_path / "log.csv", "time_s", [f"{ms // 1000}.{ms % 1000}" for ms in MS])
     text = import_log(raw).map_text.replace(', "time"]', "]")

@@ -13,7 +13,7 @@ from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
 from discsim.validation.importing.sniffing.turning import best_worth, steps_between
 
-__all__ = ["TELLING", "WORTHS", "by_behaviour", "looks_like"]
+__all__ = ["TELLING", "WORTHS", "by_behaviour", "looks_like", "rests_aslant"]
 
 #: What one reading of a gyroscope may be worth, rad/s: rad/s, deg/s, mdeg/s, and counts of 16 bits over 2000 deg/s.
 WORTHS = (1.0, np.pi / 180, np.pi / 180e3, np.pi / 180 / 16.384)
@@ -21,6 +21,9 @@ WORTHS = (1.0, np.pi / 180, np.pi / 180e3, np.pi / 180 / 16.384)
 TELLING = 0.35
 #: At rest a gyroscope reads its offset, below 20 deg/s, and in a spin hundreds: less than a tenth of its largest.
 STILL = 0.1
+#: Means over 16 rows of one size, to 5 %, most of which lie this far aslant to others (cosine of 20 degrees) are
+#: gravity's: what turns steadily, and so reads a steady rate, keeps its axis.
+ALIKE, ASLANT = 0.05, np.cos(np.radians(20.0))
 
 
 def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list[tuple[Triple, str, Decision]]:
@@ -64,6 +67,19 @@ def looks_like(value: FloatArray) -> tuple[str, str]:
     if why and abs(rest_norm(sound) / gravity_norm(sound) - 1) < REST:
         return "accelerometer", why
     return _alone(sound)
+
+
+def rests_aslant(value: FloatArray) -> str:
+    """Return why readings (n, 3) are gravity's although in no usual unit; empty where they do not show it."""
+    sound = value[np.isfinite(value).all(axis=1)]
+    count = len(sound) // 16
+    means = sound[: count * 16].reshape(count, 16, 3).mean(axis=1)
+    size = np.linalg.norm(means, axis=1)
+    shared = float(np.median(size)) if count else 0.0
+    resting = means[np.abs(size - shared) < ALIKE * shared] / max(shared, 1e-300)
+    if len(resting) < max(4, count / 2) or np.min(resting @ resting.T) > ASLANT:
+        return ""
+    return f"it reads {shared:.4g} most of the time, in directions that differ"
 
 
 def _clear_of(triples: Sequence[Triple], taken: Sequence[int], left: Sequence[int]) -> list[int]:
