@@ -19,6 +19,12 @@ MISSING = 1.5
 TWICE = 0.1
 #: stamps rounded to more than this share of a step: their mean step is taken, for the median would be off by a per cent
 ROUNDED = 0.01
+#: stamps coarser than this share of a step: the usual step may be the rounding's (a row each 1.18 ms in whole ms)
+COARSE = 0.3
+#: rows that come evenly, in stamps so coarse, stay this near to a straight line (in units of the last decimal) over so
+#: many steps that the rounding made longer, by the median of so many pieces: 0.5 where they are even to the last, 0.9
+#: to 1.7 where they come late by up to half a unit; rows that were lost at random part from it by 2.3 and more
+NEAR, LONGER, PIECES = 1.9, 16, 5
 #: steps that agree within this are written by a rule, and no clock's: nothing is told from them
 EXACT = 1e-6
 
@@ -63,8 +69,11 @@ def row_timing(t: FloatArray) -> RowTiming:
     steps = np.diff(t)
     usual = float(np.median(steps))
     # stamps rounded to a third of a step or more tell no lateness of that size; a missing row they still do
-    rounding = min(_decimal(t) / usual, 0.3)
-    if rounding > ROUNDED:  # the median is one of the rounded steps, and off by as much
+    rounding = min(_decimal(t) / usual, COARSE)
+    even = _even_step(t, usual) if rounding == COARSE else None
+    if even is not None:
+        usual, rounding = even, _decimal(t) / even
+    elif rounding > ROUNDED:  # the median is one of the rounded steps, and off by as much
         usual = float(np.mean(steps[np.abs(steps / usual - 1) < LATE + rounding]))
     ratio = steps / usual
     uneven = np.abs(ratio - 1) > LATE + rounding
@@ -73,13 +82,33 @@ def row_timing(t: FloatArray) -> RowTiming:
     late_row = (ratio >= MISSING) & (np.abs(ratio + after - 2) <= LATE + rounding)
     # in a log whose every step is uneven, a long step is one of them; six of its scatter are not
     scatter = float(sd_by_median(ratio - np.median(ratio)))
-    missing = (ratio >= max(MISSING, 1 + 6 * scatter)) & ~late_row
+    missing = (ratio >= max(MISSING, 1 + 6 * scatter, 1 + 1.05 * rounding)) & ~late_row
     twice = int(np.count_nonzero(ratio < TWICE)) if 1 - 6 * scatter > TWICE else 0
     lost = int(np.sum(np.round(ratio[missing]) - 1))
     made_up = np.append(False, late_row[:-1])
     late = int(np.count_nonzero(uneven & ~missing & ~made_up))
     exact = bool(np.all(np.abs(ratio - np.round(ratio)) < EXACT * np.maximum(1.0, np.abs(t[1:]) / usual * 1e-3)))
     return RowTiming(usual, late, lost, int(np.count_nonzero(missing)), float(np.max(steps)), twice, exact)
+
+
+def _even_step(t: FloatArray, usual: float) -> float | None:
+    """Return the even step, s, of stamps (n,) that are rounded to about a ``usual`` step; None where they are not even.
+
+    Most of their steps are one unit of the rounding, some two. Rows that were lost at random are none of such a rule.
+    """
+    unit = _decimal(t)
+    steps = np.round(np.diff(t) / unit)
+    longer = int(np.count_nonzero(steps > np.median(steps)))
+    if longer < LONGER or unit < COARSE * usual:
+        return None
+    size = int(np.ceil(t.size * LONGER / longer))
+    pieces = [t[start : start + size] for start in range(0, t.size - size + 1, size)]
+    row = np.arange(size)
+    lines = [np.polynomial.polynomial.polyfit(row, piece, 1) for piece in pieces]
+    off = [np.max(np.abs(piece - line[0] - line[1] * row)) for piece, line in zip(pieces, lines, strict=True)]
+    if len(off) < PIECES or np.median(off) > NEAR * unit:
+        return None
+    return float(np.median([line[1] for line in lines]))
 
 
 def _decimal(t: FloatArray) -> float:

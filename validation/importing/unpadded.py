@@ -77,7 +77,7 @@ def unpadded(cells: CellTexts, time: FloatArray) -> Unpadded | None:
 
 def _ascends(meant: FloatArray, back: int) -> bool:
     """Tell whether times (n,) go back at most a share as often as they did before, which is ``back`` times."""
-    return bool(np.all(np.isfinite(meant))) and np.count_nonzero(np.diff(meant) < 0) <= LEFT * back
+    return bool(np.all(np.isfinite(meant)) and np.count_nonzero(np.diff(meant) < 0) <= LEFT * back)
 
 
 def _of_cut_counts(seconds: FloatArray, counts: IntArray, decimals: FloatArray) -> FloatArray:

@@ -193,3 +193,72 @@ def test_a_gyroscope_of_one_axis_beside_other_sensors_is_said_with_the_lines_of_
     log = import_log(write_table(tmp_path / "log.csv", [*columns, (name, LOG.gyro[:, 2])]))
     line = f'[sensors.rate_reference] columns = ["{name}"], unit = {unit} (scale'
     assert [note for note in log.notes if line in note]
+
+
+def test_what_a_count_is_worth_stands_above_gyroflow_s_logs(tmp_path):
+    """Its scales were passed over: a spin of 3229 deg/s came in as 1615, a guess."""
+    per_g, per_rad_s = 1 / 2048, 0.002
+    above = f"GYROFLOW IMU LOG\nversion,1.3\norientation,YxZ\ntscale,0.001\ngscale,{per_rad_s}\nascale,{per_g}\n"
+    columns = [("t", np.round(1e3 * LOG.t).astype(int)), *three(["gx", "gy", "gz"], np.round(LOG.gyro / per_rad_s))]
+    columns += three(["ax", "ay", "az"], np.round(LOG.accel / G0 / per_g))
+    raw = write_table(tmp_path / "video.gcsv", columns)
+    raw.write_text(above + raw.read_text("utf-8"), "utf-8")
+    log = import_log(raw)
+    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=per_rad_s)
+    units = {one.what: one for one in log.decisions if one.what.endswith("unit")}
+    assert units["gyroscope unit"].sure == units["accelerometer unit"].sure == "certain"
+    assert "a line above the table says so" in units["gyroscope unit"].why
+
+
+def test_a_gopro_s_columns_1_and_2_are_the_other_axes_in_their_order(tmp_path):
+    names = ['"Gyroscope (z,x,y) [rad/s]"', "1", "2"]
+    columns = [("cts", 1e3 * LOG.t), *three(names, LOG.gyro[:, [2, 0, 1]]), ("temperature [°C]", 0 * LOG.t + 33)]
+    log = import_log(write_table(tmp_path / "GYRO.csv", columns))
+    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+    (unit,) = [decision for decision in log.decisions if decision.what == "gyroscope unit"]
+    assert unit.choice == "rad/s"
+
+
+def test_a_gyroscope_s_axes_may_be_called_by_euler_s_angles(tmp_path):
+    names = ["Gyro_Phi", "Gyro_Psi", "Gyro_Theta"]
+    columns = [("time_us", 1e6 * LOG.t), *three(names, LOG.gyro[:, [0, 2, 1]]), *three(["ax", "ay", "az"], LOG.accel)]
+    log = import_log(write_table(tmp_path / "log.csv", columns))
+    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+
+
+def test_three_columns_that_never_move_are_no_field_that_turns(tmp_path):
+    """A sum of floats made them move by 1e-17, and the gyroscope told that to nothing."""
+    rows = [f"4;{t:.3f};{w[0]:.4f};{w[1]:.4f};{w[2]:.4f}" for t, w in zip(LOG.t, LOG.gyro, strict=True)]
+    still = [f"9;{t:.3f};0.195;5.64;8.02" for t in LOG.t]
+    mixed = [line for pair in zip(rows, still, strict=True) for line in pair]
+    (tmp_path / "log.csv").write_text("\n".join(mixed) + "\n", "utf-8")
+    log = import_log(tmp_path / "log.csv")
+    assert list(log.recordings[0].samples) == ["gyroscope"]
+
+
+NAMED = {
+    "capitals behind the axis, of a watch": (["x_A", "y_A", "z_A"], ["x_R", "y_R", "z_R"], ["x_M", "y_M", "z_M"]),
+    "units in words behind underscores": (
+        [f"{axis}_ACCELERATION_METERS_PER_SECOND_SQUARED" for axis in "XYZ"],
+        [f"{axis}_ANGULAR_VELOCITY_DEGREES_PER_SECOND" for axis in "XYZ"],
+        [f"MAG_{axis}_IN_UT" for axis in "XYZ"],
+    ),
+}
+
+
+@pytest.mark.parametrize("form", NAMED)
+def test_a_watch_s_and_a_specification_s_names_are_known(tmp_path, form):
+    """Of the one a gyroscope alone was guessed, the others' A and M being amperes and metres; of the other none."""
+    accel, gyro, mag = NAMED[form]
+    columns = [("time_ms", 1e3 * LOG.t), *three(accel, LOG.accel), *three(gyro, LOG.gyro / DEG), *three(mag, LOG.mag)]
+    read = import_log(write_table(tmp_path / "log.csv", columns)).recordings[0].samples
+    assert_allclose(read["gyroscope"].value, LOG.gyro, atol=1e-4)
+    assert_allclose(read["accelerometer"].value, LOG.accel, atol=1e-4)
+    assert_allclose(read["magnetometer"].value, LOG.mag, atol=1e-3)
+
+
+def test_g_behind_in_is_a_force_also_in_capitals(tmp_path):
+    """It was gauss: 99 uT, with iron near the sensor."""
+    columns = [("HEADER_TIME_STAMP_ms", 1e3 * LOG.t), *three(["X_IN_G", "Y_IN_G", "Z_IN_G"], LOG.accel / G0)]
+    log = import_log(write_table(tmp_path / "log.csv", columns))
+    assert_allclose(log.recordings[0].samples["accelerometer"].value, LOG.accel, atol=1e-4)

@@ -306,6 +306,18 @@ def test_a_log_all_of_whose_columns_are_read_says_nothing_of_others(tmp_path):
     assert sniff(write_table(tmp_path / "log.csv", columns)).notes == ()
 
 
+@pytest.mark.parametrize(("per_g", "per_deg_s"), [(16384, 131.072), (4096, 16.384)])
+def test_small_whole_numbers_beside_counts_of_g_are_a_gyroscope_s_counts(tmp_path, per_g, per_deg_s):
+    """A rocket's counts of 2341 were taken for deg/s: beyond any usual gyroscope's range, and 131 times too much."""
+    slow = np.round(LOG.gyro / np.max(np.abs(LOG.gyro)) * 2400)
+    still = np.round(per_g * np.array([0.0, 0.0, 1.0]) + np.random.default_rng(1).normal(0.0, 5.0, LOG.accel.shape))
+    columns = [("t_ms", np.round(1000 * LOG.t).astype(int)), *three(["AX", "AY", "AZ"], still)]
+    proposal = sniff(write_table(tmp_path / "log.csv", [*columns, *three(["GX", "GY", "GZ"], slow)]))
+    unit = next(decision for decision in proposal.all_decisions if decision.what == "gyroscope unit")
+    assert unit.choice == f"1/{per_deg_s:.5g} deg/s a count"
+    assert f"whole numbers beside {per_g} counts per g" in unit.why
+
+
 # ------------------------------------------------------------------------------------------------------- archives
 
 

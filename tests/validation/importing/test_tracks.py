@@ -59,9 +59,23 @@ def qualisys() -> str:
     )
 
 
+def trc() -> str:
+    """Return a TRC file: mm, names over the first of three columns each, a row without a marker."""
+    head = "PathFileType\t4\t(X/Y/Z)\trun.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
+    head += f"120\t120\t{T.size}\t2\tmm\n"
+    head += "Frame#\tTime\ta\t\t\tb\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
+    lines = [
+        f"{k + 1}\t{T[k]:.5f}\t{x:.3f}\t{y:.3f}\t{z:.3f}\t{x + 130:.3f}\t{y:.3f}\t{z:.3f}"
+        for k, (x, y, z) in enumerate(1000 * XYZ)
+    ]
+    lines[50] = f"51\t{T[50]:.5f}\t\t\t\t\t\t"
+    return head + "\n".join(lines) + "\n"
+
+
 @pytest.mark.parametrize(
     ("name", "written"),
     [
+        ("run.trc", trc),
         ("take.csv", motive),
         ("trial.csv", vicon),
         ("run.tsv", qualisys),
@@ -78,7 +92,7 @@ def test_a_path_is_read_as_a_flights_track(tmp_path, name: str, written: Callabl
     assert recording.plant == "flight"
     assert set(recording.samples) == {"track"}
     track = recording.need("track")
-    whole = np.delete(np.arange(T.size), 50) if name == "run.tsv" else np.arange(T.size)
+    whole = np.delete(np.arange(T.size), 50) if name in ("run.tsv", "run.trc") else np.arange(T.size)
     assert_allclose(track.value[whole], NED[whole], atol=1e-5)
     assert_allclose(track.t, T, atol=1e-5)
     assert recording.disc is not None

@@ -98,7 +98,7 @@ def _said(sensor: str, triple: Triple, why: str) -> Decision:
 def _moves(value: FloatArray) -> bool:
     """Tell three components of a vector: each moves, and no two are copies, as prices of one day are."""
     sound = value[np.isfinite(value).all(axis=1)]
-    if not np.all(sound.std(axis=0) > 0):
+    if not np.all(np.ptp(sound, axis=0) > 0):
         return False
     return bool(np.abs(np.corrcoef(sound.T))[np.triu_indices(3, 1)].min() < 0.9)
 

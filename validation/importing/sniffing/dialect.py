@@ -27,6 +27,8 @@ HEAD_LINES = 200
 RECORD_SHARE = 0.4
 #: Names stand before the cells of a log where they do in this share of its lines: some break off, some are messages.
 LABELLED = 0.8
+#: The axes of three columns in the name of the first.
+_ORDER = re.compile(r"\(([xyz]), ?([xyz]), ?([xyz])\)", re.IGNORECASE)
 #: Between the lines of a record over several there may be blank ones and headings: up to three to two of names.
 WITH_NAMES = 0.4
 #: Of hexadecimal numbers of four digits five in six have a letter; an identifier may have one in each row.
@@ -260,6 +262,8 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
     written = texts[-1] if texts else []
     if layout.lists and texts:
         texts[-1] = _spread_names(written, lines[record], layout)
+    if texts:
+        texts[-1] = _spread_axes(texts[-1])
     rows = [layout.cells(lines[record]), layout.cells(lines[-1])]
     names = _fitting(texts[-1], width, rows, layout) if texts else None
     if names is not None and names[-1] == UNNAMED:
@@ -301,6 +305,26 @@ def _spread_names(cells: list[str], line: str, layout: Layout) -> list[str]:
     if len(sizes) != len(cells):
         return cells
     return [name for cell, size in zip(cells, sizes, strict=True) for name in names_of_list(cell, size)]
+
+
+def _spread_axes(cells: list[str]) -> list[str]:
+    """Return names of which one stands for three columns, the others being called 1 and 2, as a GoPro's are written.
+
+    >>> _spread_axes(["cts", "Gyroscope (z,x,y) [rad/s]", "1", "2"])
+    ['cts', 'Gyroscope z [rad/s]', 'Gyroscope x [rad/s]', 'Gyroscope y [rad/s]']
+    """
+    from discsim.validation.importing.sniffing.names import sensor_of
+    from discsim.validation.importing.sniffing.units import split_unit
+
+    found = list(cells)
+    for k, cell in enumerate(cells[:-2]):
+        if cells[k + 1 : k + 3] == ["1", "2"]:
+            order = _ORDER.search(cell)
+            base, unit = split_unit(_ORDER.sub("", cell))
+            if sensor_of(base.strip()) is not None:
+                behind = f" [{unit}]" if unit else ""
+                found[k : k + 3] = [f"{base.strip()} {axis}{behind}" for axis in (order.groups() if order else "xyz")]
+    return found
 
 
 def _fitting(cells: list[str], width: int, rows: list[list[str]], layout: Layout) -> tuple[str, ...] | None:

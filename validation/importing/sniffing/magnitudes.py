@@ -19,6 +19,7 @@ __all__ = [
     "PER_DEG_S",
     "Unit",
     "accelerometer_unit",
+    "counts_per_g",
     "field_size",
     "gravity_norm",
     "gyroscope_unit",
@@ -38,6 +39,8 @@ MIDDLE = 45.0
 SHARES = (0.67**0.5, 0.67**-0.5)
 #: Counts per g of usual parts: 16 bits over 2, 4, 8, 16 g; 12, 10 and 8 bits of older parts. A factor of 2 apart.
 PER_G = (16384.0, 8192.0, 4096.0, 2048.0, 1024.0, 512.0, 256.0, 64.0)
+#: Counts per g and per deg/s of a part that nobody has set (MPU-6050, ICM-20948: 2 g and 250 deg/s).
+AT_FIRST = (16384.0, 131.072)
 #: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch) and 245 to 4000 deg/s (ST).
 PER_DEG_S = (131.072, 65.536, 32.768, 16.384, 8.192, 114.286, 57.143, 28.571, 14.286, 7.143)
 #: Counts per uT: AK8963 (16, 14 bit), LIS3MDL at 4 to 16 G, HMC5883L, QMC5883L (2, 8 G), MMC5983 (16, 18 bit), IST8310.
@@ -215,6 +218,12 @@ def accelerometer_unit(value: FloatArray, stated: Reading | None) -> Unit:
     return Unit("m/s^2", 1.0, _said(name, "m/s^2", "guess", why))
 
 
+def counts_per_g(unit: Unit | None) -> float | None:
+    """Return what an accelerometer of a unit counts per g; None where it does not count, or is none."""
+    counts = unit is not None and unit.unit == "g" and "a count" in unit.decision.choice
+    return 1.0 / unit.scale if unit is not None and counts else None
+
+
 def field_size(value: FloatArray) -> tuple[float, str]:
     """Return the size of the field in readings (n, 3): a sphere's radius where they go round one, else their norm."""
     sound = value[np.isfinite(value).all(axis=1)]
@@ -289,13 +298,14 @@ def gyroscope_unit(
     by: str = "the field",
     *,
     clock: Sureness = "certain",
+    per_g: float | None = None,
 ) -> Unit:
     """Return a gyroscope's unit.
 
     ``turned`` is how many rad/s one of its readings is worth by the turning of ``by`` (the field, gravity) in the same
     log, None where that does not tell. A header's unit stands against all but that, and against that as well where the
     ``clock`` by which it turns is a guess, or a likely one and the unit is none that headers are wrong by (`MISTAKEN`);
-    without one, size and steps decide.
+    without one, size and steps decide. ``per_g`` is what an accelerometer beside it counts per g: a chip counts both.
     """
     name = "gyroscope"
     peak = float(np.nanmax(np.linalg.norm(value, axis=1)))
@@ -324,15 +334,21 @@ def gyroscope_unit(
         return Unit(near, 1.0, _said(name, near, "likely", f"{by} turns as fast in this unit"))
     if (_whole(value) and (peak > 5000 or stated is not None)) or peak * _RAD > LARGEST_RAD_S:
         return _gyroscope_counts(turned, by, "whole numbers" if _whole(value) else "beyond any gyroscope in deg/s")
+    if _whole(value) and per_g is not None:
+        told = f"whole numbers beside {per_g:.0f} counts per g"
+        return _gyroscope_counts(turned, by, told, at_first=per_g == AT_FIRST[0])
     return _by_size(value, peak)
 
 
-def _gyroscope_counts(turned: float | None, by: str, told: str) -> Unit:
+def _gyroscope_counts(turned: float | None, by: str, told: str, *, at_first: bool = False) -> Unit:
     name = "gyroscope"
     if turned is not None:
         per = min(PER_DEG_S, key=lambda per: abs(np.log(turned / (_RAD / per))))
         why = f"{told}; by the turning of {by} one count is 1/{_RAD / turned:.4g} deg/s"
         return Unit("deg/s", 1 / per, _said(name, f"1/{per:.5g} deg/s a count", "likely", why))
+    if at_first:
+        why = f"{told}; taken as 16 bits over 250 deg/s, as a part is switched on that counts so"
+        return Unit("deg/s", 1 / AT_FIRST[1], _said(name, f"1/{AT_FIRST[1]:.5g} deg/s a count", "guess", why))
     why = f"{told}; taken as 16 bits over 2000 deg/s, the usual range of a fast motion"
     return Unit("deg/s", 1 / 16.384, _said(name, "1/16.384 deg/s a count", "guess", why))
 

@@ -139,12 +139,16 @@ _RATES = {"p": 0, "q": 1, "r": 2, "rollrate": 0, "pitchrate": 1, "yawrate": 2, "
 
 #: Angles, which are rates where their unit says so (Yaw in deg/s).
 _ANGLES = {"roll": 0, "pitch": 1, "yaw": 2}
+#: Sensors behind an axis by a capital (x_A, y_M, z_R), as watches write them: no ampere, no metre.
+_CAPITALS = {"A": "acc", "M": "mag", "R": "rotrate"}
+#: A gyroscope's axis called by the angle of Euler's about it.
+_ABOUT = re.compile(r"(.+?)[\s_.-]*(phi|theta|psi)", re.IGNORECASE)
 
 
 def _without_axis(name: str) -> tuple[str, int | None]:
     """Return a name without its axis, and the axis: x, y, z (0, 1, 2 in brackets) at the end, in front or between."""
     patterns = (
-        (r"^(.*?)[\s_\-.]*[\[\(]?(?<!it)([xyzXYZ])[\]\)]?$", (1, 2)),  # the y of velocity is none
+        (r"^(.*?)[\s_\-.]*[\[\(]?(?<![iI][tT])([xyzXYZ])[\]\)]?$", (1, 2)),  # the y of velocity is none
         (r"^(.*?)[\s_\-.]*\[([012])\]$", (1, 2)),
         (r"^()([xyzXYZ])(?:[\s_\-.]+|(?=[A-Z]))(.*)$", (3, 2)),
         (r"^(.+?[\s_\-.:])([xyzXYZ])[\s_\-.](.+)$", (1, 2)),
@@ -165,12 +169,18 @@ def read_name(name: str) -> Name:
 
     >>> read_name("Gyro X (deg/s)"), read_name("yaw_rate"), read_name("Rate_Z").base
     (Name(base='Gyro', axis=0, unit='deg/s'), Name(base='rotrate', axis=2, unit=''), 'rotrate')
+    >>> read_name("Gyro_Psi"), read_name("y_M"), read_name("y_m")
+    (Name(base='Gyro', axis=2, unit=''), Name(base='mag', axis=1, unit=''), Name(base='', axis=1, unit='m'))
     """
     rest, unit = split_unit(name.strip())
     if (axis := _RATES.get(re.sub(r"[\s_\-]+", "", rest.lower()))) is not None:
         return Name("rotrate", axis, unit)
     if (axis := _ANGLES.get(rest.lower())) is not None and any(r.sensor == "gyroscope" for r in readings_of(unit)):
         return Name("rotrate", axis, unit)
+    if (about := _ABOUT.fullmatch(rest)) is not None and sensor_of(about[1]) == "gyroscope":
+        return Name(about[1], ("phi", "theta", "psi").index(about[2].lower()), unit)
+    if (lettered := re.fullmatch(r"([xyz])_([AMR])", name.strip())) is not None:
+        return Name(_CAPITALS[lettered[2]], "xyz".index(lettered[1]), "")
     base, axis = _without_axis(rest)
     base = base.rstrip(" /")
     if not unit and base:

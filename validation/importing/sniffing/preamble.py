@@ -22,6 +22,9 @@ _OTHER = re.compile(r"baud|filter|cut-?off|bandwidth|\bd?lpf\b|cpu|clock|i2c|spi
 _COUNT = r"(?:LSB|digit|count|bit)s?"
 _WORTH = re.compile(rf"{_NUMBER}\s*([^\s\d,;:=()]+)\s*(?:/|\bper\b)\s*{_COUNT}\b", re.IGNORECASE)
 _PER_UNIT = re.compile(rf"{_NUMBER}\s*{_COUNT}\s*(?:/|\bper\b)\s*\(?([^\s\d,;:=()]+)", re.IGNORECASE)
+#: A line of Gyroflow's logs (gcsv), whose readings are counts: worth so much of the sensor's unit.
+_GYROFLOW = re.compile(rf"^\s*([agm])scale\s*[,;=:]\s*{_NUMBER}\s*$", re.IGNORECASE)
+_SCALED = {"a": ("accelerometer", "g"), "g": ("gyroscope", "rad/s"), "m": ("magnetometer", "gauss")}
 
 
 def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
@@ -55,8 +58,11 @@ def stated_worths(lines: Sequence[str]) -> dict[str, Reading]:
 
     >>> stated_worths(["# gyro: 16.4 LSB/dps"])["gyroscope"].unit
     'deg/s'
+    >>> stated_worths(["GYROFLOW IMU LOG", "gscale,0.00122173047"])["gyroscope"].scale
+    0.00122173047
     """
-    found: dict[str, Reading | None] = {}
+    scaled = [(_SCALED[m[1].lower()], _value(m[2])) for m in map(_GYROFLOW.match, lines) if m is not None]
+    found: dict[str, Reading | None] = {sensor: Reading(sensor, unit, worth) for (sensor, unit), worth in scaled}
     for line in lines:
         worths = [(m[2], _value(m[1])) for m in _WORTH.finditer(line)]
         worths += [(m[2], 1 / _value(m[1])) for m in _PER_UNIT.finditer(line) if _value(m[1]) > 0]

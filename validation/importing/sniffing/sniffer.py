@@ -38,6 +38,7 @@ from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import (
     Unit,
     accelerometer_unit,
+    counts_per_g,
     gyroscope_unit,
     magnetometer_unit,
 )
@@ -431,14 +432,17 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
     fit = _turned(found, times)
     turns = seen_turns(_triples(found), times, fit)
     units: dict[str, Unit] = {}
-    for sensor, (triple, _) in found.items():
+    for sensor in sorted(found):  # the accelerometer first: that one is counted is told by gravity
+        triple, _ = found[sensor]
         sound = np.isfinite(triple.values).all(axis=1)
         value = triple.values if sound.all() else triple.values[sound]
         stated, above = _stated(sensor, triple, value)
         if sensor == "gyroscope":
             told = turns if clock.column is not None else None
             by = told.by if told else "the field"
-            units[sensor] = gyroscope_unit(value, stated, told and told.worth, by, clock=clock.decision.sure)
+            per_g = counts_per_g(units.get("accelerometer"))
+            sure = clock.decision.sure
+            units[sensor] = gyroscope_unit(value, stated, told and told.worth, by, clock=sure, per_g=per_g)
         elif sensor == "accelerometer":
             units[sensor] = accelerometer_unit(value, stated)
         else:

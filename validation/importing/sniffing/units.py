@@ -89,6 +89,8 @@ _COMMA = re.compile(r"^(.*\S)\s*,\s*([^,]+)$")
 _BARRED = re.compile(r"^\"?([^|\"]+)\"?\|\s*\"?([^|\"]*)\"?\s*(?:\|.*)?$")
 #: A unit that only its capital parts from a letter for time or for an axis (tsMs, gyroXDps).
 _CAPITAL = re.compile(r"^(ts?)(Ms|Us|Ns)$|^(.*[a-z]_?[XYZ])(Dps|Mdps|Rads|Mps2|UT|Gauss|Mgauss|Mg)$")
+#: Words that only a unit has, behind a name whose blanks may be underscores.
+_WORDED = re.compile(r"\bper\b|^in\b|\bsquared$")
 
 
 def _plain(spelling: str) -> str:
@@ -122,6 +124,8 @@ def split_unit(name: str) -> tuple[str, str]:
     (('gyro_x', 'deg/s'), ('ts', 'Ms'), ('gyroX', 'Dps'))
     >>> split_unit("Gyro X, deg/s"), split_unit('AccelX|"G"|-3.0|3.0|25')
     (('Gyro X', 'deg/s'), ('AccelX', 'G'))
+    >>> split_unit("X_ANGULAR_VELOCITY_DEGREES_PER_SECOND"), split_unit("X_IN_G")
+    (('X_ANGULAR_VELOCITY', 'degrees per second'), ('X', 'in g'))
     >>> split_unit("velMs"), split_unit("status"), split_unit("accX")
     (('velMs', ''), ('status', ''), ('accX', ''))
     """
@@ -133,9 +137,13 @@ def split_unit(name: str) -> tuple[str, str]:
             return behind[1].strip(), behind[2].strip()
     if barred := _BARRED.match(name):
         return barred[1].strip(), barred[2].strip()
-    for gap in list(re.finditer(r"[_\s-]+", name))[-3:]:  # m_s_2 is the longest
-        if gap.start() and readings_of(name[gap.end() :]):
-            return name[: gap.start()], name[gap.end() :]
+    for gap in list(re.finditer(r"[_\s-]+", name))[-5:]:  # in_meters_per_second_squared is the longest
+        last = name[gap.end() :]
+        words = re.sub(r"[_\s]+", " ", last).lower()
+        if gap.start() and _WORDED.search(words) and readings_of(words):
+            return name[: gap.start()], words
+        if gap.start() and readings_of(last):
+            return name[: gap.start()], last
     if capital := _CAPITAL.match(name):
         base, unit = capital[1] or capital[3], capital[2] or capital[4]
         return base, unit

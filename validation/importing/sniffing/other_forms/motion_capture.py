@@ -1,4 +1,4 @@
-"""Exports of motion capture as comma-separated text: Motive (OptiTrack), Nexus (Vicon) and QTM (Qualisys).
+"""Exports of motion capture as text: Motive (OptiTrack), Nexus (Vicon), QTM (Qualisys) and TRC (Cortex, OpenSim).
 
 Their names, axes and units stand in lines of their own, and the rate of frames in place of times. As a table rows had
 no names; the points of QTM were taken for an accelerometer's and a magnetometer's readings.
@@ -60,6 +60,8 @@ def _reader(path: Path) -> Callable[[list[Cells]], _Points] | None:
         return _motive
     if first in ("Trajectories", "Devices", "Joints", "Model Outputs") and "Frame,Sub Frame" in "\n".join(lines):
         return _vicon
+    if first.startswith("PathFileType"):
+        return _trc
     return _qualisys if first.startswith("NO_OF_FRAMES\t") else None
 
 
@@ -71,7 +73,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
     read = _reader(raw)
     assert read is not None
     encoding, _ = first_lines(raw)
-    rows = all_rows(raw, encoding, "\t" if read is _qualisys else ",")
+    rows = all_rows(raw, encoding, "\t" if read in (_qualisys, _trc) else ",")
     try:
         points = read([[cell.strip() for cell in row] for row in rows])
         if points.time is None and not 0.0 < points.rate < np.inf:
@@ -169,6 +171,16 @@ def _qualisys(rows: list[Cells]) -> _Points:
     seen = [_seen(row, list(found.values())) for row in table]
     rate = float(head["FREQUENCY"][0])
     return _Points(found, "mm", seen, time=1 if lead else None, rate=rate)
+
+
+def _trc(rows: list[Cells]) -> _Points:
+    """Return the markers of a TRC file, whose names stand over the first of three columns each."""
+    head = dict(zip(rows[1], rows[2], strict=False))
+    above = next(k for k, row in enumerate(rows) if row and row[0].startswith("Frame"))
+    found = {name: (k, k + 1, k + 2) for k, name in enumerate(rows[above]) if k > 1 and name}
+    table = [row for row in rows[above + 1 :] if row and not np.isnan(_value(row[0]))]
+    unit = head["Units"]
+    return _Points(found, _METRES.get(unit.lower(), unit), table, time=1)
 
 
 def _seen(row: Cells, places: Sequence[tuple[int, int, int]]) -> Cells:
