@@ -262,3 +262,28 @@ def test_g_behind_in_is_a_force_also_in_capitals(tmp_path):
     columns = [("HEADER_TIME_STAMP_ms", 1e3 * LOG.t), *three(["X_IN_G", "Y_IN_G", "Z_IN_G"], LOG.accel / G0)]
     log = import_log(write_table(tmp_path / "log.csv", columns))
     assert_allclose(log.recordings[0].samples["accelerometer"].value, LOG.accel, atol=1e-4)
+
+
+def test_g_force_is_an_accelerometer_s_beside_an_acceleration_without_gravity(tmp_path):
+    """A phone's `gFx` was no sensor's: the capital had parted it, and `ax` without gravity was taken."""
+    linear = np.random.default_rng(4).normal(0.0, 0.3, LOG.accel.shape)
+    columns = [("time", LOG.t), *three(["gFx", "gFy", "gFz"], LOG.accel / G0), *three(["ax", "ay", "az"], linear)]
+    columns += three(["wx", "wy", "wz"], LOG.gyro)
+    log = import_log(write_table(tmp_path / "log.csv", columns))
+    assert_allclose(log.recordings[0].samples["accelerometer"].value, LOG.accel, atol=1e-4)
+
+
+def test_a_line_of_sources_below_the_units_is_no_line_of_names(tmp_path):
+    names = ["timestamp", "lap", *[f"{axis}_acc" for axis in "xyz"], *[f"{axis}_rate_of_rotation" for axis in "xyz"]]
+    head = [
+        ",".join(names),
+        "unix time,,G,G,G,deg/s,deg/s,deg/s",
+        ",,201: acc,201: acc,201: acc,202: gyro" + ",202: gyro" * 2,
+    ]
+    table = np.column_stack([1714557600 + LOG.t, 0 * LOG.t, LOG.accel / G0, LOG.gyro / DEG])
+    rows = [",".join(f"{cell:.6f}" for cell in row) for row in table]
+    above = ["This file is created using RaceChrono v7 ( http://racechrono.com/ ).", "Format,3", ""]
+    (tmp_path / "log.csv").write_text("\n".join([*above, *head, *rows]) + "\n", "utf-8")
+    read = import_log(tmp_path / "log.csv").recordings[0].samples
+    assert_allclose(read["gyroscope"].value, LOG.gyro, atol=1e-4)
+    assert_allclose(read["accelerometer"].value, LOG.accel, atol=1e-4)

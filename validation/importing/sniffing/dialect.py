@@ -256,6 +256,8 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
     above = [index for index in range(record) if lines[index].strip()]
     texts = [_header_cells(lines[index], layout) for index in above]
     units: tuple[str, ...] = ()
+    if len(texts) > 2 and _are_units(texts[-2], texts[-3], width, layout) and _repeated(texts[-1]):
+        texts, above = texts[:-1], above[:-1]  # from where each column comes, as RaceChrono writes it
     if len(texts) > 1 and _are_units(texts[-1], texts[-2], width, layout):
         units, texts, above = tuple(texts.pop()), texts, above[:-1]
         units = (*units, *[""] * (len(texts[-1]) - len(units)))[:width]
@@ -380,9 +382,14 @@ def _looks_like_units(cells: list[str], layout: Layout) -> bool:
 
     full = [cell.strip("()[]{}<> ") for cell in cells if cell.strip("()[]{}<>- ")]
     known = sum(bool(readings_of(cell)) for cell in full)
-    # names are other ones in each column, and units repeat: some may be of no unit known here
-    repeated = len(set(full)) <= len(full) / 2
-    return (known > len(full) / 2 or (known > 1 and repeated)) and not any(_is_number(cell, layout) for cell in full)
+    units = known > len(full) / 2 or (known > 1 and _repeated(full))  # some may be of no unit known here
+    return units and not any(_is_number(cell, layout) for cell in full)
+
+
+def _repeated(cells: list[str]) -> bool:
+    """Tell what repeats, as units do: names are other ones in each column."""
+    full = [cell for cell in cells if cell]
+    return len(set(full)) <= len(full) / 2
 
 
 def _joined(path: Path, layout: Layout, above: list[int], width: int) -> tuple[Layout, tuple[str, ...]] | None:

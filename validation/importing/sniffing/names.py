@@ -231,8 +231,13 @@ def _split(name: str) -> list[str]:
 
 
 def sensor_of(base: str) -> str | None:
-    """Return the sensor that a name (of a column without axis and unit, of a file, of an id) speaks of, or None."""
+    """Return the sensor that a name (of a column without axis and unit, of a file, of an id) speaks of, or None.
+
+    >>> [sensor_of(base) for base in ("gF", "g", "high_g", "gyr", "f")]
+    ['accelerometer', 'gyroscope', 'accelerometer', 'gyroscope', None]
+    """
     words = _parts(base)
+    words = ["gf"] if words == ["g", "f"] else words  # a capital parts words
     letter = re.sub(r"\d+$", "", words[-1])
     if letter in _LETTERS and not (letter == "g" and words[:-1] and words[-2] in _RANGES):
         return _LETTERS[letter]

@@ -237,10 +237,9 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
         mine = mine or [t for t in alive if t.sensor == sensor == "accelerometer" and linear_with_gravity(t)]
         if not mine:
             continue
-        # of several the one with gravity in it, then the plainest name, then the first
-        named[sensor] = min(
-            mine, key=lambda t: (sensor == "accelerometer" and weightless(t), t.penalty, triples.index(t))
-        )
+        # of several one that moves, the one with gravity in it, then the plainest name, then the first
+        light = sensor == "accelerometer"
+        named[sensor] = min(mine, key=lambda t: (_still(t), light and weightless(t), t.penalty, triples.index(t)))
     wider = {sensor: wider_range(first, _like(first, alive)) for sensor, first in named.items()}
     named |= {sensor: item[0] for sensor, item in wider.items() if item is not None}
     meant, decisions, notes = exchanged(named)
@@ -295,6 +294,11 @@ def _dead(triple: Triple) -> bool:
     """Tell a sensor that reads exactly zero, or another number on all axes, throughout."""
     value = triple.values[np.isfinite(triple.values)]
     return value.size == 0 or bool(np.ptp(value) == 0)
+
+
+def _still(triple: Triple) -> bool:
+    """Tell a sensor each of whose axes reads one number throughout."""
+    return bool(np.all(np.nanmax(triple.values, axis=0) == np.nanmin(triple.values, axis=0)))
 
 
 def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -> list[tuple[Triple, str]]:
