@@ -11,6 +11,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from discsim.rounded_stamps import evened, unit_of
 from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.track_ends import flight_of
 from discsim.validation.identification.initial.smoothing import FEWEST
@@ -27,6 +28,8 @@ _FIXES = 4
 _SILENT, _INTERVALS = 0.25, 5.0
 #: shares of readings above which it is worth saying that they stand at the range, or repeat the one before
 _CLIPPED, _HELD = 0.05, 0.3
+#: what is said of stamps that were rounded
+_EVENED = "the stamps of the {} are rounded to {:g} ms, and even but for that: its readings are taken at even times."
 
 
 def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[list[Recording], list[str]]:
@@ -44,10 +47,12 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
         if note:
             notes.setdefault(note, []).append(name)
         sheets = dict(recording.sheets)
-        for sensor, samples in recording.samples.items():
+        for sensor, samples in _evened(recording).items():
             left, step = _shortened(samples, sheets[sensor], _longest(recording))
             for note in _notes(recording, sensor, samples, left, step):
                 notes.setdefault(note, []).append(name)
+            if samples is not recording.samples[sensor]:
+                notes.setdefault(_EVENED.format(sensor, 1e3 * unit_of(recording.samples[sensor].t)), []).append(name)
             if left is not None:
                 kept[sensor] = left
                 sheets[sensor] = replace(sheets[sensor], rate_hz=sheets[sensor].rate_hz / step)
@@ -55,6 +60,15 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
         _enough(usable[-1], name)
     said = [note if len(where) == len(names) else f"{', '.join(where)}: {note}" for note, where in notes.items()]
     return usable, [*_absent(usable, names), *_unplaced(usable), *said]
+
+
+def _evened(recording: Recording) -> dict[str, Samples]:
+    """Return the samples by sensor, those whose stamps are rounded at the times of rows that come evenly."""
+    times = {sensor: evened(samples.t) for sensor, samples in recording.samples.items()}
+    return {
+        sensor: samples if times[sensor] is samples.t else Samples(times[sensor], samples.value)
+        for sensor, samples in recording.samples.items()
+    }
 
 
 def _in_flight(recording: Recording) -> tuple[Recording, str]:
