@@ -13,6 +13,7 @@ from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.rounded_stamps import evened, unit_of
 from discsim.validation.diagnosis.selection.candidates import unplaced
+from discsim.validation.diagnosis.throw_ends import free_part
 from discsim.validation.diagnosis.track_ends import flight_of
 from discsim.validation.identification.initial.smoothing import FEWEST
 from discsim.validation.identification.plants import plant_of
@@ -43,9 +44,10 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
-        recording, note = _in_flight(recording)
-        if note:
-            notes.setdefault(note, []).append(name)
+        for cut in (_free, _in_flight):
+            recording, note = cut(recording)
+            if note:
+                notes.setdefault(note, []).append(name)
         sheets = dict(recording.sheets)
         for sensor, samples in _evened(recording).items():
             left, step = _shortened(samples, sheets[sensor], _longest(recording))
@@ -69,6 +71,19 @@ def _evened(recording: Recording) -> dict[str, Samples]:
         sensor: samples if times[sensor] is samples.t else Samples(times[sensor], samples.value)
         for sensor, samples in recording.samples.items()
     }
+
+
+def _free(recording: Recording) -> tuple[Recording, str]:
+    """Return a throw without the hand that began or ended it, by its gyroscope, and what was cut off."""
+    if not plant_of(recording).airborne:
+        return recording, ""
+    cut = free_part(recording)
+    said = []
+    if cut.before:
+        said.append(f"its first {cut.before:.2f} s, in which a hand still holds the disc (time counts from there)")
+    if cut.after:
+        said.append(f"its last {cut.after:.2f} s, in which it is caught or on the ground")
+    return cut.recording, f"the throw is cut: {' and '.join(said)}." if said else ""
 
 
 def _in_flight(recording: Recording) -> tuple[Recording, str]:

@@ -19,16 +19,13 @@ from scipy.signal import savgol_filter
 from discsim.arrays import BoolArray, ComplexArray, FloatArray, runs
 from discsim.clipping import clipped
 from discsim.spin_axis import FAST
+from discsim.validation.diagnosis.throw_ends import CHANGE, HALF, SHORTEST
 from discsim.validation.importing.conversion import RawReadings
 
 __all__ = ["Stretch", "stretches"]
 
-#: Between half (the fastest decay on record, a rocket's roll: 0.56 1/s) and ten (4000 deg/s out of a hand in 0.1 s).
-CHANGE = 2.0
-#: Half of what the slope is taken over, s: a hand lets go within 0.1 s.
-HALF = 0.05
-#: A drop from knee height takes 0.3 s; two turns tell a spin from a swing of the arm.
-SHORTEST, TURNS = 0.3, 2.0
+#: Two turns tell a spin from a swing of the arm.
+TURNS = 2.0
 #: The mean of the rate's direction has this length where it stays within 25 degrees of one axis.
 ONE_AXIS = 0.9
 #: Twice the largest air force on a disc, 2 g, over a row at 100 Hz is 0.4 m/s; a ground hit takes some m/s in a row.
