@@ -12,6 +12,7 @@ from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.rounded_stamps import evened, unit_of
+from discsim.validation.diagnosis.repeats import fresh
 from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.throw_ends import free_part
 from discsim.validation.diagnosis.track_ends import flight_of
@@ -44,9 +45,9 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
-        for cut in (_free, _in_flight):
-            recording, note = cut(recording)
-            if note:
+        for change in (_fresh, _free, _in_flight):
+            recording, told = change(recording)
+            for note in told:
                 notes.setdefault(note, []).append(name)
         sheets = dict(recording.sheets)
         for sensor, samples in _evened(recording).items():
@@ -73,30 +74,41 @@ def _evened(recording: Recording) -> dict[str, Samples]:
     }
 
 
-def _free(recording: Recording) -> tuple[Recording, str]:
+def _fresh(recording: Recording) -> tuple[Recording, list[str]]:
+    """Return a recording without readings that were written again with the rows of a faster log, and what is said."""
+    samples, sheets, said = dict(recording.samples), dict(recording.sheets), []
+    for sensor, one in recording.samples.items():
+        samples[sensor], rate, note = fresh(sensor, one)
+        if rate is not None:
+            sheets[sensor] = replace(sheets[sensor], rate_hz=rate)
+            said.append(note)
+    return (replace(recording, samples=samples, sheets=sheets), said) if said else (recording, [])
+
+
+def _free(recording: Recording) -> tuple[Recording, list[str]]:
     """Return a throw without the hand that began or ended it, by its gyroscope, and what was cut off."""
     if not plant_of(recording).airborne:
-        return recording, ""
+        return recording, []
     cut = free_part(recording)
     said = []
     if cut.before:
         said.append(f"its first {cut.before:.2f} s, in which a hand still holds the disc (time counts from there)")
     if cut.after:
         said.append(f"its last {cut.after:.2f} s, in which it is caught or on the ground")
-    return cut.recording, f"the throw is cut: {' and '.join(said)}." if said else ""
+    return cut.recording, [f"the throw is cut: {' and '.join(said)}."] if said else []
 
 
-def _in_flight(recording: Recording) -> tuple[Recording, str]:
+def _in_flight(recording: Recording) -> tuple[Recording, list[str]]:
     """Return a recording whose track is that of the flight alone, and what was cut off; time zero is its release.
 
     Other sensors tell when the release was: only where there are none the first point that moves does.
     """
     track = recording.get("track")
     if track is None or not plant_of(recording).follows_path:
-        return recording, ""
+        return recording, []
     cut = flight_of(track, recording.sheets["track"].noise_rms)
     if not cut.before and not cut.after:
-        return recording, ""
+        return recording, []
     flight, said = cut.flight, []
     if cut.before:
         said.append(f"its first {cut.before:.2f} s, before the disc moves")
@@ -106,7 +118,7 @@ def _in_flight(recording: Recording) -> tuple[Recording, str]:
     if cut.after:
         said.append(f"its last {cut.after:.2f} s, in which it is too slow to fly: it has come down")
     samples = {**recording.samples, "track": flight}
-    return replace(recording, samples=samples), f"the track is cut: {' and '.join(said)}."
+    return replace(recording, samples=samples), [f"the track is cut: {' and '.join(said)}."]
 
 
 def _refuse(recording: Recording, name: str) -> None:

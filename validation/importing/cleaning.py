@@ -17,7 +17,7 @@ from discsim.validation.importing.own_times import between_rows, in_step, own_ti
 from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.timing import row_timing
 
-__all__ = ["Cleaned", "body_moves", "cleaned", "frozen_runs", "without_glitches"]
+__all__ = ["Cleaned", "body_moves", "cleaned", "frozen_runs", "without_glitches", "without_repeats"]
 
 #: a sensor that shows one value on this many rows, while the body moves, is dead
 CONSTANT = 50
@@ -95,11 +95,11 @@ def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stampe
             f"{1 / row:.4g} Hz: they bear {own.even}, at most a row before the row on which they stand"
         )
         return Cleaned(found, 1 / own.period, tuple(notes))
-    readings, period, said_of_it = _held(sensor, found, held, total, stamped)
+    readings, period, said_of_it = without_repeats(sensor, found, held, total, stamped)
     return Cleaned(readings, 1 / period, (*notes, said_of_it))
 
 
-def _held(sensor: str, found: Readings, held: Held, total: int, stamped: bool) -> tuple[Readings, float, str]:
+def without_repeats(sensor: str, found: Readings, held: Held, total: int, stamped: bool) -> tuple[Readings, float, str]:
     """Return the fresh readings of a sensor that is held over rows, its period (s), and what to say.
 
     ``total`` rows were there before gaps and frozen stretches were taken out.

@@ -215,8 +215,10 @@ def _even(together: BoolArray) -> float | None:
     if rows.size < FEWEST + 1:
         return None
     spacing = np.diff(rows)
-    # the block's own mean, and not that of the spacings: a cluster of repeats in a long block is not even
-    mean = together.size / rows.size
+    # the block's own mean where that of the spacings does not fill it: a cluster of repeats in a long block is not even
+    mean = float(np.mean(spacing))
+    if abs(together.size / mean - rows.size) > 1.0:
+        mean = together.size / rows.size
     chance = (spacing - 1) * np.log1p(-1 / mean) - np.log(mean)
     likely = [
         float(np.sum(np.log((1 - ODD) * _even_share(spacing, mean, stutter) + ODD * np.exp(chance) + 1e-300)))

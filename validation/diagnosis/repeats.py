@@ -1,0 +1,35 @@
+"""Sensors whose readings a faster logger wrote again with each of its rows: the readings themselves.
+
+A repeat says that nothing moved between two rows, which noise and a spinning field contradict. Takes the samples of a
+recording; gives those of fresh readings, by the rule with which logs are imported.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from discsim.recording import Samples
+from discsim.validation.importing.cleaning import without_repeats
+from discsim.validation.importing.held import find_held
+from discsim.validation.importing.readings import Readings
+
+__all__ = ["fresh"]
+
+
+def fresh(sensor: str, samples: Samples) -> tuple[Samples, float | None, str]:
+    """Return a sensor's samples without repeats, its own rate (Hz) and what to say; None and nothing without repeats.
+
+    A reading has the time at which it was taken, where the rows tell that; rows that are gaps on all axes go, too.
+    """
+    table = samples.value.reshape(len(samples), -1)
+    read = ~np.all(np.isnan(table), axis=1)
+    found = Readings(np.flatnonzero(read), samples.t[read], table[read])
+    held = find_held(found.value) if np.any(read) else None
+    if held is None:
+        return samples, None, ""
+    readings, period, said = without_repeats(sensor, found, held, len(samples), stamped=True)
+    # the first may have been taken up to a row before the first row: no motion is known there
+    time = np.maximum(readings.time, samples.t[0])
+    ascends = np.diff(time, prepend=-np.inf) > 0.0
+    value = readings.value[ascends].reshape(-1, *samples.value.shape[1:])
+    return Samples(time[ascends], value), 1.0 / period, f"{said}."
