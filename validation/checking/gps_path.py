@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, scatter_of
 from discsim.effects.catalogue import catalogued
 from discsim.effects.setup import GpsAxes
 from discsim.recording import Recording
 from discsim.validation.checking.finding import Finding
 from discsim.validation.checking.path_points import out_of_reach, rows_in_words, standing
 from discsim.validation.checking.statements import FASTEST
-from discsim.validation.diagnosis.track_ends import scatter_of
 from discsim.validation.importing.held import find_held
 from discsim.validation.importing.import_map import SPEEDS
 

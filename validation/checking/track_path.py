@@ -7,16 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, scatter_of
 from discsim.disc import Release
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding
 from discsim.validation.checking.gps_path import elsewhere
 from discsim.validation.checking.path_points import out_of_reach, rows_in_words, standing
 from discsim.validation.checking.statements import FASTEST
-from discsim.validation.diagnosis.track_ends import scatter_of
 
-__all__ = ["track_findings"]
+__all__ = ["holds_height", "track_findings"]
 
 #: a speed is that over so long (s), or over one step where rows are farther apart: a click that is off by the disc's
 #: radius then changes it by 1 m/s
@@ -372,9 +371,8 @@ def _height_sign(track: _Track) -> Finding | None:
     below = float(np.median(down))
     if below < _GROUND + slack or track.t.size < 6:
         return None
-    bend = 2.0 * float(np.polyfit(track.t - track.t[0], down, 2)[0])
     begins = float(np.median(down[:3]))
-    up = _is_height(down, track.noise) or (abs(begins) < _GROUND + slack and bend < -1.0)
+    up = _is_upwards(track)
     if not up and begins < _GROUND + slack:
         return None  # a throw down a hill
     return Finding(
@@ -387,6 +385,27 @@ def _height_sign(track: _Track) -> Finding | None:
         if up
         else "down_m counts from another level, or upwards: subtract that of the ground, or turn its sign",
     )
+
+
+def _is_upwards(track: _Track) -> bool:
+    """Tell whether a path below the ground is that of a throw from a hand, or bends as one does, turned over."""
+    down, slack = track.position[:, 2], 4.0 * track.noise
+    if float(np.median(down)) < _GROUND + slack or track.t.size < 6:
+        return False
+    bend = 2.0 * float(np.polyfit(track.t - track.t[0], down, 2)[0])
+    begins = float(np.median(down[:3]))
+    return _is_height(down, track.noise) or (abs(begins) < _GROUND + slack and bend < -1.0)
+
+
+def holds_height(recording: Recording) -> bool:
+    """Tell whether the column ``down_m`` of a flight's track holds the height, positive upwards."""
+    samples = recording.get("track")
+    if samples is None or recording.plant != "flight":
+        return False
+    sheet = recording.sheets["track"]
+    track = _whole(samples, sheet.noise_rms, sheet.rate_hz)
+    track = None if track is None else _moving(track)
+    return track is not None and bool(track.seen[2]) and _height_column(track) is None and _is_upwards(track)
 
 
 def _bearing(track: _Track, wind: float, release: Release) -> Iterator[Finding]:

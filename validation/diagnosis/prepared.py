@@ -12,6 +12,7 @@ from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.rounded_stamps import evened, unit_of
+from discsim.validation.checking.track_path import holds_height
 from discsim.validation.diagnosis.repeats import fresh
 from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.throw_ends import free_part
@@ -45,7 +46,7 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
-        for change in (_fresh, _free, _in_flight):
+        for change in (_fresh, _free, _downwards, _in_flight):
             recording, told = change(recording)
             for note in told:
                 notes.setdefault(note, []).append(name)
@@ -96,6 +97,18 @@ def _free(recording: Recording) -> tuple[Recording, list[str]]:
     if cut.after:
         said.append(f"its last {cut.after:.2f} s, in which it is caught or on the ground")
     return cut.recording, [f"the throw is cut: {' and '.join(said)}."] if said else []
+
+
+def _downwards(recording: Recording) -> tuple[Recording, list[str]]:
+    """Return a flight whose track counts downwards, where it held the height, and that its sign was turned."""
+    if not holds_height(recording):
+        return recording, []
+    track = recording.samples["track"]
+    turned = Samples(track.t, track.value * np.array([1.0, 1.0, -1.0]))
+    said = (
+        "down_m of the track holds the height, positive upwards: its sign is turned. To mend it, turn it in the file."
+    )
+    return replace(recording, samples={**recording.samples, "track": turned}), [said]
 
 
 def _in_flight(recording: Recording) -> tuple[Recording, list[str]]:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, scatter_of
 from discsim.recording import Samples
 
-__all__ = ["TrackCut", "flight_of", "scatter_of"]
+__all__ = ["TrackCut", "flight_of"]
 
 #: share of the speed of the half second beside it below which a track's end, or beginning, is no flight: the drag of a
 #: driver (C_D of 0.3 at 20 m/s, 0.18 kg) takes 30 % of the speed in a second, 10 % between the middles of the two
@@ -56,15 +56,6 @@ def flight_of(track: Samples, noise: float | None = None) -> TrackCut:
         return TrackCut(track, 0.0, 0.0)
     flight = track.between(t[first] if before else -np.inf, t[last] if after else np.inf)
     return TrackCut(flight, before, after)
-
-
-def scatter_of(position: FloatArray) -> float:
-    """Return the scatter of single points (n, k) m by third differences, robustly; 0 of fewer than four.
-
-    Third differences of white noise have 20 times its variance.
-    """
-    third = np.diff(position, 3, axis=0)
-    return float(np.median(np.abs(third)) / 0.6745 / 20.0**0.5) if third.size else 0.0
 
 
 def _flying(t: FloatArray, plan: FloatArray, noise: float) -> int:

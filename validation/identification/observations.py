@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS, Recording
 from discsim.validation.identification.clipping import clipping_level
 from discsim.validation.identification.plants import plant_of
@@ -28,7 +29,8 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
             level = np.hypot(_or_nan(sheet.noise_rms), (sheet.resolution or 0.0) / np.sqrt(12.0))
             # a noise of zero is none: nobody knows it
             sd = np.full(measured.shape[1], level if level > 0.0 else np.nan)
-            clipped, limit = sheet.clipped(measured), sheet.range
+            clipped = sheet.clipped(measured)
+            limit = _limit(measured, clipped, sheet.range)
             lower = clipping_level(recording) if sensor == "accelerometer" else None
             if lower is not None:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
@@ -39,6 +41,13 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
         one = Readings(sensor, samples.t, measured, good, clipped, sd, axes, limit, taken, weights)
         found += plant_of(recording).observed(recording, one)
     return tuple(found)
+
+
+def _limit(measured: FloatArray, clipped: BoolArray, stated: float | None) -> float | None:
+    """Return the size beyond which a sensor shows nothing: its stated range, or where below that its readings stand."""
+    sizes = np.abs(measured[clipped & np.isfinite(measured)])
+    found = float(np.min(sizes)) if sizes.size else np.inf
+    return min(found, np.inf if stated is None else stated) if sizes.size or stated is not None else None
 
 
 def _or_nan(number: float | None) -> float:

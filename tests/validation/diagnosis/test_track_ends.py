@@ -73,3 +73,22 @@ def test_where_another_sensor_tells_the_release_its_time_stays():
     assert used.need("track").t[0] == pytest.approx(0.5, abs=3.0 * FRAME)
     assert not any("time counts" in note for note in notes)
     assert replace(used, samples={}).end == 0.0
+
+
+def test_a_track_that_holds_the_height_is_turned_over_aloud_and_one_that_counts_downwards_is_not():
+    t = np.arange(0.0, 3.0, FRAME)
+    height = 1.3 + 5.6 * t - 2.0 * t**2
+    north, east = 15.0 * t - t**2, 0.2 * t**2
+    for down, count in ((height, 1), (-height, 0)):
+        track = Samples(t, np.column_stack([north, east, down]))
+        flight = Recording(
+            "flight",
+            "throw",
+            FIELD,
+            disc=DRIVER,
+            sheets={"track": SensorSheet(30.0, 0.02)},
+            samples={"track": track},
+        )
+        (usable,), said = prepared([flight], ["01"])
+        np.testing.assert_allclose(usable.samples["track"].value[:, 2], -height)
+        assert sum("positive upwards" in one for one in said) == count

@@ -9,10 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, scatter_of
 from discsim.errors import InputError
 from discsim.files import model_names
-from discsim.validation.diagnosis.track_ends import scatter_of
 from discsim.validation.importing.import_map import UNITS
 from discsim.validation.importing.sniffing.clock import Clock, seconds
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
