@@ -10,7 +10,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 
-__all__ = ["evened", "unit_of"]
+__all__ = ["evened", "last_decimal", "unit_of"]
 
 #: stamps that are rounded to less than this share of a step are left as they are
 COARSE = 0.02
@@ -23,10 +23,14 @@ FEWEST = 24
 _SPAN = 32
 
 
+def last_decimal(t: FloatArray) -> float:
+    """Return the last decimal place to which stamps, or steps between them, (n,) s are written, from 1 s to 1 ns."""
+    return next((10.0**-d for d in range(9) if np.all(np.abs(t - np.round(t, d)) < 1e-10)), 1e-9)
+
+
 def unit_of(t: FloatArray) -> float:
-    """Return the decimal place, from 1 s to 1 ns, of which all steps between stamps (n,) s are whole multiples."""
-    steps = np.diff(t)
-    return next((10.0**-d for d in range(9) if np.all(np.abs(steps - np.round(steps, d)) < 1e-10)), 1e-9)
+    """Return the decimal place, s, of which all steps between stamps (n,) s are whole multiples."""
+    return last_decimal(np.diff(t))
 
 
 def evened(t: FloatArray) -> FloatArray:

@@ -314,12 +314,16 @@ def _leaps(track: _Track) -> Iterator[Finding]:
 
 def _of_columns(track: _Track, wind: float, release: Release) -> Iterator[Finding]:
     """Yield a height that is in another column or has the other sign, and a plan that is turned from the stated."""
-    if track.seen[2]:
-        found = _height_column(track) or _height_sign(track)
-        if found is not None:
-            yield found
-            return
+    found = _of_height(track)
+    if found is not None:
+        yield found
+        return
     yield from _bearing(track, wind, release)
+
+
+def _of_height(track: _Track) -> Finding | None:
+    """Return that the height is in another column or has the other sign; None where it is right, or is not seen."""
+    return _height_column(track) or _height_sign(track) if track.seen[2] else None
 
 
 def _is_height(h: FloatArray, noise: float) -> bool:
@@ -371,8 +375,9 @@ def _height_sign(track: _Track) -> Finding | None:
     below = float(np.median(down))
     if below < _GROUND + slack or track.t.size < 6:
         return None
+    bend = 2.0 * float(np.polyfit(track.t - track.t[0], down, 2)[0])
     begins = float(np.median(down[:3]))
-    up = _is_upwards(track)
+    up = _is_height(down, track.noise) or (abs(begins) < _GROUND + slack and bend < -1.0)
     if not up and begins < _GROUND + slack:
         return None  # a throw down a hill
     return Finding(
@@ -387,16 +392,6 @@ def _height_sign(track: _Track) -> Finding | None:
     )
 
 
-def _is_upwards(track: _Track) -> bool:
-    """Tell whether a path below the ground is that of a throw from a hand, or bends as one does, turned over."""
-    down, slack = track.position[:, 2], 4.0 * track.noise
-    if float(np.median(down)) < _GROUND + slack or track.t.size < 6:
-        return False
-    bend = 2.0 * float(np.polyfit(track.t - track.t[0], down, 2)[0])
-    begins = float(np.median(down[:3]))
-    return _is_height(down, track.noise) or (abs(begins) < _GROUND + slack and bend < -1.0)
-
-
 def holds_height(recording: Recording) -> bool:
     """Tell whether the column ``down_m`` of a flight's track holds the height, positive upwards."""
     samples = recording.get("track")
@@ -405,7 +400,8 @@ def holds_height(recording: Recording) -> bool:
     sheet = recording.sheets["track"]
     track = _whole(samples, sheet.noise_rms, sheet.rate_hz)
     track = None if track is None else _moving(track)
-    return track is not None and bool(track.seen[2]) and _height_column(track) is None and _is_upwards(track)
+    found = None if track is None else _of_height(track)
+    return found is not None and (found.id, found.severity) == ("track.height", "error")
 
 
 def _bearing(track: _Track, wind: float, release: Release) -> Iterator[Finding]:

@@ -46,17 +46,15 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
-        for change in (_fresh, _free, _downwards, _in_flight):
+        for change in (_fresh, _free, _downwards, _in_flight, _evened):
             recording, told = change(recording)
             for note in told:
                 notes.setdefault(note, []).append(name)
         sheets = dict(recording.sheets)
-        for sensor, samples in _evened(recording).items():
+        for sensor, samples in recording.samples.items():
             left, step = _shortened(samples, sheets[sensor], _longest(recording))
             for note in _notes(recording, sensor, samples, left, step):
                 notes.setdefault(note, []).append(name)
-            if samples is not recording.samples[sensor]:
-                notes.setdefault(_EVENED.format(sensor, 1e3 * unit_of(recording.samples[sensor].t)), []).append(name)
             if left is not None:
                 kept[sensor] = left
                 sheets[sensor] = replace(sheets[sensor], rate_hz=sheets[sensor].rate_hz / step)
@@ -64,15 +62,6 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
         _enough(usable[-1], name)
     said = [note if len(where) == len(names) else f"{', '.join(where)}: {note}" for note, where in notes.items()]
     return usable, [*_absent(usable, names), *_unplaced(usable), *said]
-
-
-def _evened(recording: Recording) -> dict[str, Samples]:
-    """Return the samples by sensor, those whose stamps are rounded at the times of rows that come evenly."""
-    times = {sensor: evened(samples.t) for sensor, samples in recording.samples.items()}
-    return {
-        sensor: samples if times[sensor] is samples.t else Samples(times[sensor], samples.value)
-        for sensor, samples in recording.samples.items()
-    }
 
 
 def _fresh(recording: Recording) -> tuple[Recording, list[str]]:
@@ -132,6 +121,17 @@ def _in_flight(recording: Recording) -> tuple[Recording, list[str]]:
         said.append(f"its last {cut.after:.2f} s, in which it is too slow to fly: it has come down")
     samples = {**recording.samples, "track": flight}
     return replace(recording, samples=samples), [f"the track is cut: {' and '.join(said)}."]
+
+
+def _evened(recording: Recording) -> tuple[Recording, list[str]]:
+    """Return a recording whose rounded stamps, where rows come evenly, are their times, and what is said."""
+    samples, said = dict(recording.samples), []
+    for sensor, one in recording.samples.items():
+        t = evened(one.t)
+        if t is not one.t:
+            samples[sensor] = Samples(t, one.value)
+            said.append(_EVENED.format(sensor, 1e3 * unit_of(one.t)))
+    return (replace(recording, samples=samples), said) if said else (recording, [])
 
 
 def _refuse(recording: Recording, name: str) -> None:

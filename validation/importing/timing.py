@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.arrays import FloatArray, sd_by_median
+from discsim.rounded_stamps import last_decimal
 
 __all__ = ["RowTiming", "row_timing"]
 
@@ -69,10 +70,11 @@ def row_timing(t: FloatArray) -> RowTiming:
     steps = np.diff(t)
     usual = float(np.median(steps))
     # stamps rounded to a third of a step or more tell no lateness of that size; a missing row they still do
-    rounding = min(_decimal(t) / usual, COARSE)
-    even = _even_step(t, usual) if rounding == COARSE else None
+    unit = last_decimal(t)
+    rounding = min(unit / usual, COARSE)
+    even = _even_step(t, unit) if rounding == COARSE else None
     if even is not None:
-        usual, rounding = even, _decimal(t) / even
+        usual, rounding = even, unit / even
     elif rounding > ROUNDED:  # the median is one of the rounded steps, and off by as much
         usual = float(np.mean(steps[np.abs(steps / usual - 1) < LATE + rounding]))
     ratio = steps / usual
@@ -91,15 +93,14 @@ def row_timing(t: FloatArray) -> RowTiming:
     return RowTiming(usual, late, lost, int(np.count_nonzero(missing)), float(np.max(steps)), twice, exact)
 
 
-def _even_step(t: FloatArray, usual: float) -> float | None:
-    """Return the even step, s, of stamps (n,) that are rounded to about a ``usual`` step; None where they are not even.
+def _even_step(t: FloatArray, unit: float) -> float | None:
+    """Return the even step, s, of stamps (n,) rounded to a ``unit`` (s) of about a step; None where they are not even.
 
     Most of their steps are one unit of the rounding, some two. Rows that were lost at random are none of such a rule.
     """
-    unit = _decimal(t)
     steps = np.round(np.diff(t) / unit)
     longer = int(np.count_nonzero(steps > np.median(steps)))
-    if longer < LONGER or unit < COARSE * usual:
+    if longer < LONGER:
         return None
     size = int(np.ceil(t.size * LONGER / longer))
     pieces = [t[start : start + size] for start in range(0, t.size - size + 1, size)]
@@ -109,8 +110,3 @@ def _even_step(t: FloatArray, usual: float) -> float | None:
     if len(off) < PIECES or np.median(off) > NEAR * unit:
         return None
     return float(np.median([line[1] for line in lines]))
-
-
-def _decimal(t: FloatArray) -> float:
-    """Return the last decimal place that stamps (n,) s were written to, from 1 s to 1 ns."""
-    return next((10.0**-d for d in range(9) if np.all(np.abs(t - np.round(t, d)) < 1e-10)), 1e-9)
