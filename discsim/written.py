@@ -26,7 +26,7 @@ __all__ = ["PREFIX", "as_written", "corrected", "require_seconds"]
 
 #: sensor -> prefix of its effects
 PREFIX: Mapping[str, str] = MappingProxyType(
-    {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps"}
+    {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps", "track": "track"}
 )
 #: share of one axis in another below which it is the rounding of a rotation matrix (1e-16) and no reading: of a whole
 #: range it is less than a step of a 24-bit converter (6e-8)

@@ -57,11 +57,11 @@ class Row(NamedTuple):
     ``untold`` by any reading.
 
     On its nature: an event ``lasts`` some seconds, or as long as the parameter that is named there says; what comes
-    with a disc, with how a sensor is made or with a place is ``in_all`` of its recordings; one that ``follows_spin``
-    makes the motion pulse with the turns, one ``per_turn`` so many times as that parameter says; one of the motion that
-    is ``also_read`` changes what a sensor reads of a given motion, too; one that ``hides_readings`` leaves no reading
-    behind that a fit could use; parameters ``in_percent`` are shares; it ``becomes`` (another effect's id, by its
-    parameter, at a value).
+    with a disc, with how a sensor is made or with a place is ``in_all`` of its recordings, what is done by hand for
+    each has sizes that are ``each_its_own``; one that ``follows_spin`` makes the motion pulse with the turns, one
+    ``per_turn`` so many times as that parameter says; one of the motion that is ``also_read`` changes what a sensor
+    reads of a given motion, too; one that ``hides_readings`` leaves no reading behind that a fit could use; parameters
+    ``in_percent`` are shares; it ``becomes`` (another effect's id, by its parameter, at a value).
 
     Where a parameter is infinite at the baseline, ``regular`` tells what a fit moves instead; rules for a fit are then
     of those numbers.
@@ -95,6 +95,7 @@ class Row(NamedTuple):
     needs: tuple[str, ...] = ()
     lasts: float | str = 0.0
     in_all: bool = False
+    each_its_own: bool = False
     follows_spin: bool = False
     per_turn: str = ""
     also_read: bool = False

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from discsim.effects import setup
-from discsim.effects.kind import EVERYWHERE, FLIGHT, UNSEEN_IN_MEANS, Row, with_article
+from discsim.effects.kind import BOARD, EVERYWHERE, FLIGHT, UNSEEN_IN_MEANS, Row, with_article
 
 __all__ = ["ROWS"]
 
@@ -54,7 +54,7 @@ def _time_offset(prefix: str, sensor: str, grows_with: str, trace: str) -> Row:
         f"{prefix}.time_offset",
         setup.TimeOffset,
         sensor,
-        EVERYWHERE,
+        EVERYWHERE if sensor in BOARD else FLIGHT,
         (1e-4,),
         setup=True,
         title=f"times of the {sensor} that are shifted",
@@ -64,6 +64,7 @@ def _time_offset(prefix: str, sensor: str, grows_with: str, trace: str) -> Row:
         bounds={"offset_s": (-2.0, 2.0)},
         moves_time=True,
         unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
+        each_its_own=sensor not in BOARD,
     )
 
 
@@ -89,6 +90,15 @@ ROWS = (
     _time_offset("mag", "magnetometer", "spin", _TURNED),
     _time_offset("accel", "accelerometer", "spin", _TURNED),
     _time_offset("gyro", "gyroscope", "rate of change", _SHIFTED),
+    # a film, or a receiver's log, is begun by hand; that fixes come late by themselves is gps.latency
+    _time_offset("track", "track", "speed", "the track shows where the disc will be a moment later, or was before"),
+    _time_offset("gps", "gps", "speed", "fixes show where the disc will be a moment later")._replace(
+        title="GPS fixes that are stamped early",
+        form="written time = true time + {offset_s}, of the GPS; a late one is its latency",
+        scale=(0.002,),
+        bounds={"offset_s": (-2.0, 0.0)},
+        sign={"offset_s": -1.0},
+    ),
     Row(
         "board.rotation",
         setup.BoardRotation,

@@ -20,11 +20,13 @@ from discsim.disc import Rig
 from discsim.effects import Effect, effect
 from discsim.motion import Motion
 from discsim.recording import Recording, Samples, read_dataset
-from discsim.sensors.sampling import Noise
+from discsim.sensors.position import Tracker
+from discsim.sensors.sampling import Noise, Sampling
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.result import Diagnosis
+from discsim.written import as_written
 
 KEYS = {
     "format",
@@ -77,6 +79,12 @@ def assert_found(diagnosis: Diagnosis, hidden: Effect, recordings: Sequence[str]
         assert abs(item.value - size) < max(3.0 * item.sd, 0.05 * abs(size)), (name, size, item)
     assert found.evidence.delta_bic > 0.0
     assert found.evidence.p_value < 1e-3
+
+
+def begun(recording: Recording, late: Effect) -> Recording:
+    """A recording with the times of a sensor shifted: what would be from before its beginning is not written."""
+    written = as_written(recording, [late])
+    return replace(written, samples={name: one.between(0.0, np.inf) for name, one in written.samples.items()})
 
 
 def assert_noise_alone(diagnosis: Diagnosis) -> None:
@@ -186,6 +194,33 @@ def test_a_knock_is_named_in_its_recording_at_its_instant():
     assert_found(diagnosis, hidden, [name])
     assert diagnosis.located[0].from_s <= 1.37 <= diagnosis.located[0].to_s
     assert diagnosis.located[0].to_s - diagnosis.located[0].from_s < 0.2
+
+
+@pytest.mark.parametrize("offsets", [(0.15, 0.15), (0.31, 0.22), (-0.08, 0.05)], ids=str)
+def test_films_that_were_begun_by_hand_are_late_each_by_its_own_time_or_all_by_one(offsets: tuple[float, float]):
+    filmed = replace(MODULE, sensors={**MODULE.sensors, "track": Tracker(Sampling(60.0), Noise(0.02))})
+    hidden = [effect("track.time_offset", offset_s=late) for late in offsets]
+    diagnosis = answer_of([begun(one, late) for one, late in zip(throws(module=filmed), hidden, strict=True)])
+    assert diagnosis.verdict == "explained"
+    assert {item.id for item in diagnosis.effects} == {"track.time_offset"}
+    alike = offsets[0] == offsets[1]
+    found = {one: item for item in diagnosis.effects for one in item.recordings or ("throw-0", "throw-1")}
+    assert [item.recordings is None for item in diagnosis.effects] == ([True] if alike else [False, False])
+    for name, late in zip(("throw-0", "throw-1"), offsets, strict=True):
+        told = found[name].parameters["offset_s"]
+        assert told.sd is not None
+        assert told.sd < 0.005
+        assert abs(told.value - late) < 3.0 * told.sd
+    assert_noise_alone(diagnosis)
+
+
+def test_a_receiver_whose_fixes_are_stamped_early_is_no_wrong_clock():
+    hidden = effect("gps.time_offset", offset_s=-0.2)
+    diagnosis = answer_of([begun(one, hidden) for one in throws(seconds=2.5)])
+    assert [item.id for item in diagnosis.effects] == [hidden.id]
+    assert_found(diagnosis, hidden)
+    # a fix that shows what is yet to come has no latency
+    assert "gps.latency" not in {other.id for other in diagnosis.effects[0].confused_with}
 
 
 def test_two_causes_are_told_apart():

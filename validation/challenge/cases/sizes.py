@@ -289,6 +289,8 @@ ON_REQUEST = frozenset(
         "imu.own_clock",
         "mag.average",
         "track.camera",
+        "track.time_offset",
+        "gps.time_offset",
     }
 )
 #: effects that unknowns of a plant take in: the part of a free spin's acceleration that turns with the spin is

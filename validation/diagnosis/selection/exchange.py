@@ -12,9 +12,14 @@ from dataclasses import replace
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import IN_PLACE, lead, price
-from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.selection.refits import refitting
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
+from discsim.validation.diagnosis.selection.score_tests import (
+    ScreenedCandidate,
+    backwards,
+    scope_price,
+    start_of,
+)
 from discsim.validation.diagnosis.selection.screening import free_columns
 from discsim.validation.diagnosis.selection.search_state import (
     Rival,
@@ -52,15 +57,14 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
     """
     if unreliable(found, final):
         return final
-    for candidate in final.hypothesis.candidates:
-        if candidate.recordings is None or candidate.fixed_values or candidate.row.event:
-            continue
-        everywhere = replace(candidate, recordings=None)
+    alone = [one for one in final.hypothesis.candidates if one.recordings is not None and not one.fixed_values]
+    for candidate in {one.id: one for one in alone if not one.row.event}.values():
+        others = tuple(one for one in final.hypothesis.candidates if one.id != candidate.id)
         present = values_of_fit(final)
         start = {(key, None if key[0] == candidate.id else some): number for (key, some), number in present.items()}
         wide = continuous_fit(
             final.fit,
-            final.hypothesis.without(candidate).plus(everywhere),
+            Hypothesis((*others, replace(candidate, recordings=None))),
             found.own,
             final.fit.noise,
             start,
@@ -184,8 +188,11 @@ def _by_algebra(found: Search, candidate: CandidateEffect) -> list[tuple[float, 
         if other.id == candidate.id or any(other.id == one.id for one in rest.candidates):
             continue
         scoped = replace(other, recordings=candidate.recordings)
-        asked = [*taken, *free_columns(scoped)]
+        freed = free_columns(scoped)
+        asked = [*taken, *freed]
         answer = equations.solve(asked)
+        if backwards(freed, answer):
+            continue
         screened = ScreenedCandidate(scoped, without - answer.chi2, start_of(asked, answer, (scoped,)))
         near.append((answer.chi2 - best, screened))
     near.sort(key=lambda item: item[0])

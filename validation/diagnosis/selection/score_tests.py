@@ -59,7 +59,7 @@ def screened_candidates(
             rest = [(c, q) for c, q in taken if q.key not in {p.key for _, p in columns} or scope is not None]
             answer = equations.solve([*rest, *columns])
             gain = base - answer.chi2
-            if _backwards(columns, answer):
+            if backwards(columns, answer):
                 continue
             screened = ScreenedCandidate(scoped, gain, start_of([*rest, *columns], answer, (scoped,)))
             if best is None or gain > best.gain + (scope_price(equations.recordings) if scope is not None else 0.0):
@@ -102,7 +102,7 @@ def scope_price(recordings: int) -> float:
     return float(2.0 * np.log(recordings) + 6.0)
 
 
-def _backwards(freed: Sequence[tuple[Column, Parameter]], answer: ScoreTest) -> bool:
+def backwards(freed: Sequence[tuple[Column, Parameter]], answer: ScoreTest) -> bool:
     """Tell whether algebra wants, of the columns that were asked for last, a friction that drives or an early lag."""
     values = answer.value[len(answer.value) - len(freed) :]
     return any(q.key in ONE_SIDED and ONE_SIDED[q.key] * float(v) < 0 for (_, q), v in zip(freed, values, strict=True))
@@ -148,6 +148,6 @@ def pairs(equations: NormalEquations, candidates: Sequence[CandidateEffect], own
         answer = equations.solve(asked)
         hypothesis = Hypothesis(both)
         merit = answer.chi2 + SELECTION.rival * hypothesis.size
-        if merit < (found[ids].merit if ids in found else np.inf) and not _backwards(freed, answer):
+        if merit < (found[ids].merit if ids in found else np.inf) and not backwards(freed, answer):
             found[ids] = Pair(hypothesis, merit, start_of(asked, answer, both))
     return sorted(found.values(), key=lambda pair: pair.merit)

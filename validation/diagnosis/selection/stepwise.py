@@ -17,6 +17,7 @@ from discsim.effects.kind import BOARD
 from discsim.validation.diagnosis.first_trajectory import time_ratio
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.each_its_own import with_own_sizes
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import (
@@ -145,7 +146,8 @@ def _selected_forward(found: Search, of_use: int | None, law: Callable[[Search],
             beside = replace(found, final=better)
             if law(beside):
                 return beside
-        found, better = with_losses_recounted(found, with_best_instant(found, better))
+        better = with_own_sizes(found, with_best_instant(found, better))
+        found, better = with_losses_recounted(found, better)
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there
             return replace(found, final=better)
