@@ -202,7 +202,13 @@ def aero_key(name: str) -> str:
 
 
 def _aero(table: TomlTable, tabulated: Set[str], required: bool) -> tuple[Aero | None, dict[str, float]]:
-    stated = table.table("aero", required=required)
+    stated = table.table("aero")
+    if stated is None and required:
+        raise table.error(
+            None,
+            "[disc.aero] is missing, the coefficients of a flight; expected those of the disc, or of a published one "
+            "like it (`discsim list discs`), which `discsim show ultrastar` prints to copy",
+        )
     sigma_table = table.table("aero_sigma")
     sigma: dict[str, float] = {}
     absent: set[str] = set()

@@ -175,7 +175,7 @@ DAMAGED_TOML = [
         TOML[TOML.index("[disc.aero]") : TOML.index("[release]")],
         "",
         "[disc]",
-        r"missing key 'aero' in \[",
+        r"\[disc.aero\] is missing",
     ),
     *[
         (

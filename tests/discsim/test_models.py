@@ -120,7 +120,7 @@ def test_a_disc_may_be_a_file(tmp_path):
     ("old", "new", "message"),
     [
         ("mass_kg", "mass_g", "missing key 'mass_kg'"),
-        ("[disc.aero]", "[disc.aerodynamics]", "missing key 'aero'"),
+        ("[disc.aero]", "[disc.aerodynamics]", "\\[disc.aero\\] is missing"),
         ("air_density_kg_m3 = 1.204", "", "missing key 'air_density_kg_m3'"),
         ("[environment]", "[surroundings]", "missing key 'environment'"),
         ("CNr = -0.0042", "CNr = -0.0042\nCNrr = 0.1", "unknown key 'disc.aero.CNrr'"),

@@ -125,12 +125,16 @@ def failed_on_one_axis(value: FloatArray) -> BoolArray:
 
 
 def dead_axis(value: FloatArray) -> int | None:
-    """Return the axis of a gyroscope's readings (n, 3) that is 0 in every row while both others change, or None."""
+    """Return the axis of a gyroscope's readings (n, 3) that is 0 in every row while both others change, or None.
+
+    One that lies still changes by its last digit.
+    """
     sound = value[np.isfinite(value).all(axis=1)]
     if not len(sound):
         return None
     zero = np.flatnonzero(np.all(sound == 0, axis=0))
-    return int(zero[0]) if zero.size == 1 and np.count_nonzero(np.ptp(sound, axis=0)) == 2 else None
+    changes = [np.ptp(column) > STEPS * (step_of(column) or 0.0) and np.ptp(column) > 0 for column in sound.T]
+    return int(zero[0]) if zero.size == 1 and sum(changes) == 2 else None
 
 
 def _of_no_reading(seen: FloatArray, code: float, codes: FloatArray) -> BoolArray:
@@ -219,6 +223,9 @@ def _amid(sensor: str | None, value: FloatArray, sound: _Sound, number: float = 
     else:
         near = np.min(np.linalg.norm(sound.value - number, axis=1)) <= sound.least
         by_size, by_leap = not (at_end or near), True
+    step = sound.step
+    if step == 0.0:  # a gyroscope that lies still reads one number and nought, a step apart
+        step = max(float(np.min(np.diff(np.unique(column)), initial=np.inf)) for column in value[there].T)
     found = []
     for first, stop in runs(same):
         before, after = np.arange(max(0, first - BESIDE), first), np.arange(stop, min(size.size, stop + BESIDE))
@@ -228,7 +235,7 @@ def _amid(sensor: str | None, value: FloatArray, sound: _Sound, number: float = 
         if by_leap and not far and beside.size == 2:
             changes = [np.linalg.norm(np.diff(value[there[side]], axis=0), axis=1) for side in (before, after)]
             largest = float(np.max(np.concatenate(changes), initial=0.0))
-            far = bool(np.all(beside > max(STEPS * sound.step, LEAP * largest)))
+            far = bool(np.all(beside > max(STEPS * step, LEAP * largest)))
         if far:
             found.append((int(there[first]), int(there[stop - 1]) + 1))
     return found

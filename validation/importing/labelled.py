@@ -39,6 +39,10 @@ _BARE_THREE = re.compile(rf"{_NAME}\s*[:=]\s*[(<]?\s*({_NUMBER}(?:\s*[,;\t ]\s*{
 _OWNER = re.compile(rf"{_NAME}\s*:\s*(?=[xyzXYZ]\s*[:=])")
 #: a word of its own before the first name ("Scaled. Acc (mg)")
 _WORD = re.compile(r"^[^\W\d]+\.\s+")
+#: a unit in square brackets before its colon, as ST's examples print it ("Angular rate [mdps]:1.0\t-2.0\t0.5")
+_SQUARE = re.compile(r"\s*\[([^\W\d][^\[\]]*)\]\s*(?=[:=])")
+#: names and numbers in turn with nothing but blanks between ("Mx -1 My -294 Mz 420")
+_IN_TURN = re.compile(rf"(?:[^\W\d]\w*[ \t]+{_NUMBER}(?:[ \t]+|$)){{3,}}")
 _UNIT = re.compile(r" \([^()]*\)$")
 _AXIS = re.compile(r"(.*?)[\s_.]*\b([xyzXYZ])")
 #: a name with its axis glued to it ("ax")
@@ -98,6 +102,8 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     [('Mag (uT) x', '1'), ('Mag (uT) y', '2'), ('Mag (uT) z', '3')]
     >>> labelled_cells("Gyro:  x= 0.1 | y= 2 | z= 3")
     [('Gyro x', '0.1'), ('Gyro y', '2'), ('Gyro z', '3')]
+    >>> labelled_cells("Rate [dps]: 1 -2 3"), labelled_cells("Mx -1 My 2 Mz 3")
+    ([('Rate (dps) x', '1'), ('Rate (dps) y', '-2'), ('Rate (dps) z', '3')], [('Mx', '-1'), ('My', '2'), ('Mz', '3')])
     """
     if line.startswith(BEGINS):
         return sentence_cells(line)
@@ -109,6 +115,10 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     text = _WORD.sub("", (line if begun is None else begun[2]).strip())
     if not text:
         return []
+    if _IN_TURN.fullmatch(text):
+        words = text.split()
+        return found + list(zip(words[::2], words[1::2], strict=True))
+    text = _SQUARE.sub(r" (\1)", text)
     at, owner, units = 0, "", dict[str, str]()
     cells: list[tuple[str, str, str]] = []
     while at < len(text):

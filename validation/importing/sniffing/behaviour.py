@@ -44,16 +44,51 @@ def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list
         gyro, field, ratio = pair
         why = f"it says how {triples[field].label} turns ({100 * ratio:.0f} % of the changes left)"
         found.append((triples[gyro], "gyroscope", _said("gyroscope", triples[gyro], why)))
-        why = f"it turns as {triples[gyro].label} says"
-        found.append((triples[field], "magnetometer", _said("magnetometer", triples[field], why)))
+        sensor, why = "magnetometer", f"it turns as {triples[gyro].label} says"
+        if (weight := _weight(triples[field].values)[0]) and not any(known == "accelerometer" for _, known, _ in found):
+            sensor, why = "accelerometer", f"{why}, and {weight} is gravity, no field of the earth's"
+        found.append((triples[field], sensor, _said(sensor, triples[field], why)))
         left = _clear_of(triples, [gyro, field], left)
+    found += _at_rest(triples, left, found)
+    left = _clear_of(triples, [triples.index(triple) for triple, _, _ in found], left)
     for k in list(left):
         sensor, why = _alone(triples[k].values) if k in left else ("", "")
         if sensor and not any(known == sensor for _, known, _ in found):
-            said = _said(sensor, triples[k], why)
-            found.append((triples[k], sensor, said._replace(sure="guess")))
+            found.append((triples[k], sensor, _guess(sensor, triples[k], why)))
             left = _clear_of(triples, [k], left)
     return found
+
+
+def _at_rest(
+    triples: Sequence[Triple], left: Sequence[int], found: Sequence[tuple[Triple, str, Decision]]
+) -> list[tuple[Triple, str, Decision]]:
+    """Return an accelerometer that does nothing but rest, and the gyroscope beside one, as loggers write the two.
+
+    Both are guesses: three numbers that rest at 1 may be anything, and what stands beside an accelerometer mostly is
+    its gyroscope.
+    """
+    told = {sensor: triple for triple, sensor, _ in found}
+    guessed: list[tuple[Triple, str, Decision]] = []
+    if "accelerometer" not in told:
+        weights = {k: _weight(triples[k].values) for k in left}
+        resting = [k for k in left if weights[k][0] and any(_beside(triples[k], triples[other]) for other in left)]
+        if resting:
+            best = min(resting, key=lambda k: (weights[k][1], k))
+            why = f"{weights[best][0]} throughout is gravity; nothing moves it"
+            guessed.append((triples[best], "accelerometer", _guess("accelerometer", triples[best], why)))
+            told["accelerometer"] = triples[best]
+    if "accelerometer" in told and "gyroscope" not in told:
+        behind = [triples[k] for k in left if _beside(told["accelerometer"], triples[k])]
+        if behind:
+            why = "the three columns beside the accelerometer's"
+            guessed.append((behind[0], "gyroscope", _guess("gyroscope", behind[0], why)))
+    return guessed
+
+
+def _beside(one: Triple, other: Triple) -> bool:
+    """Tell whether the columns of a triple are the next ones behind another's, or else those before it."""
+    same = one.numbers is other.numbers and one.where == other.where
+    return same and other.columns[0] - one.columns[0] in (3, -3)
 
 
 def looks_like(value: FloatArray) -> tuple[str, str]:
@@ -95,6 +130,10 @@ def _said(sensor: str, triple: Triple, why: str) -> Decision:
     return Decision(sensor, triple.label, "likely", why)
 
 
+def _guess(sensor: str, triple: Triple, why: str) -> Decision:
+    return Decision(sensor, triple.label, "guess", why)
+
+
 def _moves(value: FloatArray) -> bool:
     """Tell three components of a vector: each moves, and no two are copies, as prices of one day are."""
     sound = value[np.isfinite(value).all(axis=1)]
@@ -108,10 +147,27 @@ def _gravity(value: FloatArray) -> str:
     sound = value[np.isfinite(value).all(axis=1)]
     rest = gravity_norm(sound)
     peak = float(np.percentile(np.linalg.norm(sound, axis=1), 99.9))
-    counts = PER_G if np.all(sound == np.round(sound)) else ()
-    near = [one for one in (9.80665, 1.0, 1000.0, *counts) if abs(rest / one - 1) < REST]
+    near = [one for one in _weights(sound, PER_G) if abs(rest / one - 1) < REST]
     # a field of 10 or 1000 in some unit stays what it is when the thing is thrown; a specific force does not
     return f"{rest:.4g} at rest is gravity, and it reaches {peak:.3g}" if near and peak > 1.5 * rest else ""
+
+
+def _weights(value: FloatArray, per_g: Sequence[float]) -> tuple[float, ...]:
+    """Return what gravity may be in readings (n, 3): whole numbers are mg or counts, as m/s^2 are too coarse."""
+    return (1000.0, *per_g) if np.all(value == np.round(value)) else (9.80665, 1.0, 1000.0)
+
+
+def _weight(value: FloatArray) -> tuple[str, float]:
+    """Return the size of readings (n, 3) that is gravity's in most rows, and by what share it is off; empty of others.
+
+    Gravity is in m/s^2, g, mg, or in counts where all numbers are whole.
+    """
+    sound = value[np.isfinite(value).all(axis=1)]
+    size = np.linalg.norm(sound, axis=1)
+    shared = float(np.median(size))
+    off = min(abs(shared / one - 1) for one in _weights(sound, PER_G[:4]))
+    near = off < REST and np.mean(np.abs(size - shared) < REST * shared) > 0.5
+    return (f"{shared:.4g}", off) if near else ("", off)
 
 
 def _turning_pair(

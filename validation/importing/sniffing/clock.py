@@ -329,6 +329,10 @@ def _unit(
         for unit, scale in SCALES.items():
             if EPOCH[0] < largest * scale < EPOCH[1] and unit in fits:
                 return unit, "likely", f"the header says {written}, but only {unit} since 1970 fit {largest:.4g}"
+        lasts = (largest - float(np.nanmin(value))) * SCALES[fits[0]] if fits else 0.0
+        if fits and spacing <= SLOWEST_ROWS and lasts < SHORTEST_LOG:
+            why = f"the header says so: a row every {spacing:.3g} s; in {fits[0]} the log would last {lasts:.2g} s"
+            return written, "likely", why
         if fits:
             unit = fits[0]
             why = f"the header says {written}, which is a row every {spacing:.3g} s; {unit} fits a log"
@@ -422,12 +426,18 @@ def _without(numbers: Numbers) -> Clock:
     for k, name in enumerate(numbers.table.columns):
         value = numbers.values[:, k]
         steps = np.diff(value[np.isfinite(value)])
-        if steps.size > 1 and np.mean(steps == 1) > ASCENDING and np.nanmax(value) < 1e9:
+        if steps.size > 1 and np.mean(steps == 1) > ASCENDING and np.nanmax(value) < 1e9 and not _restarts(value):
             # an index that pandas wrote has no name
             called = f"'{name}'" if name else f"column {k + 1} (no name)"
             why += f"; {called} counts the rows" * (COUNTING not in why)
             return Clock(None, "s", name, step, Decision("time", f"{step} s a row", sure, why), off)
     return Clock(None, "s", None, step, Decision("time", f"{step} s a row", sure, why), off)
+
+
+def _restarts(value: FloatArray) -> bool:
+    """Tell a count (n,) within stretches of a log, as windows: it falls again and again, and not from a byte's end."""
+    sound = value[np.isfinite(value)]
+    return bool(np.count_nonzero(np.diff(sound) < 0) > 1 and np.log2(np.max(sound) + 1) % 1)
 
 
 def _no_time(numbers: Numbers, k: int) -> str:

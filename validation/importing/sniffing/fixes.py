@@ -94,9 +94,12 @@ def _columns(numbers: Numbers) -> tuple[ProposedFixes | None, str]:
     place = numbers.degrees
     if place is None:
         return None, ""
-    height = next((k for k, name in enumerate(numbers.names) if last_word(name) in _HEIGHT), None)
-    if height is None:
+    heights = [k for k, name in enumerate(numbers.names) if last_word(name) in _HEIGHT]
+    if not heights:
         return None, "it has a latitude and a longitude, and no column of a height that a map needs beside them"
+    # a barometer's may stand beside the receiver's
+    own = words_of(numbers.names[place[0]])
+    height = max(heights, key=lambda k: len(own & words_of(numbers.names[k])))
     most = np.nanmax(np.abs(numbers.values[:, list(place)]), axis=0, initial=0.0)
     counted = _counts(numbers.values[:, list(place)])
     if not counted and (most[0] > 90.0 or most[1] > 180.0):

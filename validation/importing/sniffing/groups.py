@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
 from discsim.validation.importing.sniffing.names import (
     Name,
+    about_axes,
     is_of_mavlink,
     is_of_quaternion,
     last_word,
@@ -28,6 +30,7 @@ from discsim.validation.importing.sniffing.names import (
     sensor_of,
     sensor_of_code,
     sensor_of_file,
+    words_of,
 )
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 from discsim.validation.importing.unsigned import signed
@@ -41,11 +44,16 @@ MAX_IDS = 20
 FEWEST_ROWS = 4
 #: What SCALED_IMU counts in whole numbers (MAVLink, common messages); ArduPilot's RAW_IMU counts the same.
 _MAVLINK = {"gyroscope": "mrad/s", "accelerometer": "mg", "magnetometer": "mgauss"}
+#: What messages of ROS hold of the two under its own names (sensor_msgs/Imu).
+_ROS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
+_OF_ROS = (("angular", "velocity"), ("linear", "acceleration"))
 _PLACE = ({"lat", "latitude"}, {"lon", "lng", "long", "longitude"})
 #: a quaternion has turned where one of its numbers has changed by more: by 23 degrees at least
 _TURNED = 0.2
 _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid", "type", "name", "source", "device",
              "kind", "topic", "imu", "sensor_type", "sensortype")  # fmt: skip
+#: a part's address on its bus, as that of two of one kind in a log
+_ADDRESS = re.compile(r"0[xX][0-9a-fA-F]{2}")
 #: share of rows at which a code changes that is one of sensors in turn; and by how much less readings must change from
 #: a code's row to its next than from row to row, in three columns at least: those of one sensor change by as much
 _IN_TURN, _PARTED = 0.2, 0.5
@@ -75,6 +83,12 @@ class Numbers:
         return sum(sensor_of(read_name(name).base) is not None for name in self.names) > 2
 
     @cached_property
+    def is_of_ros(self) -> bool:
+        """Whether it has an angular velocity and a linear acceleration, as sensor_msgs/Imu calls the two."""
+        words = [words_of(name) for name in self.names]
+        return all(sum({*pair} <= own for own in words) >= 3 for pair in _OF_ROS)
+
+    @cached_property
     def degrees(self) -> tuple[int, int] | None:
         """The columns that are called a latitude and a longitude; None where there are none."""
         words = [last_word(name) for name in self.names]
@@ -91,7 +105,7 @@ class Numbers:
         units = self.dialect.units
         return tuple(
             f"{name} [{units[k].strip('()[]{}<> ')}]" if k < len(units) and units[k].strip("()[]{}<>- ") else name
-            for k, name in enumerate(self.table.columns)
+            for k, name in enumerate(about_axes(self.table.columns))
         )
 
     @cached_property
@@ -137,10 +151,16 @@ class Numbers:
             words = all(number(text, self.dialect.layout.decimal) is None for text in few)
             telling = sum(sensor_of(text) is not None for text in few)
             called = name.strip().lower() in _ID_NAMES
-            numbered = len(few) > 1 and all(text.isdecimal() for text in few)
-            if (words and (called or telling > 1)) or (numbered and (called or self._takes_turns(k))):
+            numbered = len(few) > 1 and all(text.isdecimal() for text in few) and not self._in_stretches(k)
+            addressed = len(few) > 1 and all(_ADDRESS.fullmatch(text) for text in few)
+            if addressed or (words and (called or telling > 1)) or (numbered and (called or self._takes_turns(k))):
                 return k, few
         return None
+
+    def _in_stretches(self, column: int) -> bool:
+        """Tell numbers of stretches of a log, as windows that somebody cut it into: each comes once, in its order."""
+        code = self.values[:, column]
+        return bool(np.all(np.diff(code) >= 0)) and float(np.ptp(code)) >= 2.0
 
     def _takes_turns(self, column: int) -> bool:
         """Tell codes of sensors whose rows come in turn: what stands beside them goes on from a code's row to its next.
@@ -188,6 +208,10 @@ class Triple:
     spelling: str
     penalty: int
     where: tuple[str, str] | None
+
+    def is_beside(self, other: Triple) -> bool:
+        """Whether it has another's columns, in the rows of another part."""
+        return self.numbers is other.numbers and self.columns == other.columns and self.where != other.where
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -278,6 +302,8 @@ def _named(
         value = numbers.values[:, list(columns)]
         whole = not np.any(value[np.isfinite(value)] % 1)
         units = [Reading(by_name, _MAVLINK[by_name])] if whole else units
+    if by_name in _ROS and not units and numbers.is_of_ros:
+        units = [Reading(by_name, _ROS[by_name])]
     if by_name is not None:
         if by_name == "gyroscope" and units and units[0].unit == "rad":  # PX4's gyro_rad is in rad/s
             units = [Reading("gyroscope", "rad/s")]

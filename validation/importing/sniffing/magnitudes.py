@@ -29,6 +29,8 @@ __all__ = [
 
 #: How far gravity at rest may be off: a part's zero-g offset, 60 to 80 mg an axis (MPU-9250), and 3 % of scale.
 REST = 0.12
+#: Windows of 16 rows without which single rows tell: four are 4 s at 16 rows a second.
+FEW = 4
 #: The earth's field, uT, and what a hard iron of its size makes of the readings' norm.
 FIELD = (22.0, 67.0)
 FIELD_WITH_IRON = (10.0, 150.0)
@@ -43,6 +45,8 @@ PER_G = (16384.0, 8192.0, 4096.0, 2048.0, 1024.0, 512.0, 256.0, 64.0)
 AT_FIRST = (16384.0, 131.072)
 #: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch) and 245 to 4000 deg/s (ST).
 PER_DEG_S = (131.072, 65.536, 32.768, 16.384, 8.192, 114.286, 57.143, 28.571, 14.286, 7.143)
+#: mdeg/s a count of ST's parts over 2000 to 125 deg/s (LSM6DSO, LSM9DS1), which their drivers multiply with.
+MDPS = (70.0, 35.0, 17.5, 8.75, 4.375)
 #: Counts per uT: AK8963 (16, 14 bit), LIS3MDL at 4 to 16 G, HMC5883L, QMC5883L (2, 8 G), MMC5983 (16, 18 bit), IST8310.
 PER_UT = {
     "AK8963": 1 / 0.15,
@@ -68,6 +72,8 @@ LARGEST_RAD_S = 100.0
 MISTAKEN = {"deg/s", "rad/s"}
 #: What no gyroscope's driver gives unasked: without a header only a clock that is certain tells it.
 ASKED_FOR = {"rpm", "Hz"}
+#: The range of most parts, 2000 deg/s along each axis, in rad/s.
+FASTEST = 60.0
 _RAD = np.pi / 180
 
 
@@ -174,7 +180,11 @@ def gravity_norm(value: FloatArray) -> float:
     norm = np.linalg.norm(windows.mean(axis=1), axis=1)
     steady = norm[np.linalg.norm(windows.std(axis=1), axis=1) < 0.03 * norm]
     if steady.size == 0:
-        return rest_norm(value)
+        sizes = np.linalg.norm(value, axis=1)
+        middle = float(np.median(sizes))
+        # a slow log has hardly a window: most of its rows lie still by themselves
+        alone = count <= FEW and np.mean(np.abs(sizes - middle) < REST * middle) > 0.5
+        return middle if alone else rest_norm(value)
     ordered = np.sort(steady)
     alike = np.searchsorted(ordered, 1.05 * ordered) - np.arange(ordered.size)
     first = int(np.argmax(alike))
@@ -298,14 +308,15 @@ def gyroscope_unit(
     by: str = "the field",
     *,
     clock: Sureness = "certain",
-    per_g: float | None = None,
+    beside: Unit | None = None,
 ) -> Unit:
     """Return a gyroscope's unit.
 
     ``turned`` is how many rad/s one of its readings is worth by the turning of ``by`` (the field, gravity) in the same
     log, None where that does not tell. A header's unit stands against all but that, and against that as well where the
     ``clock`` by which it turns is a guess, or a likely one and the unit is none that headers are wrong by (`MISTAKEN`);
-    without one, size and steps decide. ``per_g`` is what an accelerometer beside it counts per g: a chip counts both.
+    without one, size and steps decide, and the unit of an accelerometer ``beside`` it: a chip that counts per g counts
+    both.
     """
     name = "gyroscope"
     peak = float(np.nanmax(np.linalg.norm(value, axis=1)))
@@ -332,12 +343,17 @@ def gyroscope_unit(
         return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
     if near is not None and stated is None and (clock == "certain" or near not in ASKED_FOR):
         return Unit(near, 1.0, _said(name, near, "likely", f"{by} turns as fast in this unit"))
+    if peak > 5000 and stated is None and beside is not None and beside.unit == "mg":
+        steps = next((one for one in MDPS if np.all(np.abs(value / one - np.rint(value / one)) < 1e-6)), None)
+        why = f"beside an accelerometer in mg, as ST's examples print both; up to {peak:.4g}"
+        why += f", all of them multiples of {steps:g}, an ST part's step" * (steps is not None)
+        return Unit("mdeg/s", 1.0, _said(name, "mdeg/s", "guess" if steps is None else "likely", why))
     if (_whole(value) and (peak > 5000 or stated is not None)) or peak * _RAD > LARGEST_RAD_S:
         return _gyroscope_counts(turned, by, "whole numbers" if _whole(value) else "beyond any gyroscope in deg/s")
-    if _whole(value) and per_g is not None:
+    if _whole(value) and (per_g := counts_per_g(beside)) is not None:
         told = f"whole numbers beside {per_g:.0f} counts per g"
         return _gyroscope_counts(turned, by, told, at_first=per_g == AT_FIRST[0])
-    return _by_size(value, peak)
+    return _by_size(value, peak, beside)
 
 
 def _gyroscope_counts(turned: float | None, by: str, told: str, *, at_first: bool = False) -> Unit:
@@ -353,17 +369,24 @@ def _gyroscope_counts(turned: float | None, by: str, told: str, *, at_first: boo
     return Unit("deg/s", 1 / 16.384, _said(name, "1/16.384 deg/s a count", "guess", why))
 
 
-def _by_size(value: FloatArray, peak: float) -> Unit:
+def _by_size(value: FloatArray, peak: float, beside: Unit | None) -> Unit:
     name = "gyroscope"
     if peak > LARGEST_RAD_S:
         return Unit(
             "deg/s", 1.0, _said(name, "deg/s", "likely", f"{peak:.0f} rad/s would be beyond any gyroscope's range")
         )
     steps = np.abs(np.diff(value, axis=0))
-    steps = steps[steps > 0]
+    steps = steps[steps > 1e-9]
     noise = float(np.median(steps)) if steps.size else 0.0
     # data sheets state 0.05 to 0.3 deg/s of noise and steps of 0.004 to 0.14 deg/s: 57 times less in rad/s
     still = float(np.percentile(steps, 5)) if steps.size else 0.0
+    written = float(steps.min()) if steps.size else 0.0
+    si = beside is not None and (beside.unit, beside.decision.sure) == ("m/s^2", "certain")
+    if still > 0.004 and still < 1.5 * written and si and peak < FASTEST:
+        why = (
+            f"written in steps of {written:.2g}, so that its noise tells nothing; the accelerometer is in SI units, too"
+        )
+        return Unit("rad/s", 1.0, _said(name, "rad/s", "guess", why))
     if still > 0.004:
         why = f"up to {peak:.3g}, and steps of {noise:.2g} from row to row are a gyroscope's in deg/s"
         return Unit("deg/s", 1.0, _said(name, "deg/s", "guess", why))

@@ -13,6 +13,7 @@ from discsim.validation.importing.sniffing.units import readings_of, split_unit
 __all__ = [
     "NO_READING",
     "Name",
+    "about_axes",
     "foreign_words",
     "is_called_linear",
     "is_of_mavlink",
@@ -53,13 +54,14 @@ _STEMS = {
     ),
 }
 #: The same as whole names, once the axis is off: ax, gx, mx; wx, Bx and Hx as physics writes them; gFx of Physics
-#: Toolbox.
+#: Toolbox; AsX (angular speed) of WitMotion.
 _LETTERS = {
     "a": "accelerometer",
     "gf": "accelerometer",
     "g": "gyroscope",
     "w": "gyroscope",
     "om": "gyroscope",
+    "as": "gyroscope",
     "ω": "gyroscope",
     "m": "magnetometer",
     "b": "magnetometer",
@@ -141,6 +143,8 @@ _RATES = {"p": 0, "q": 1, "r": 2, "rollrate": 0, "pitchrate": 1, "yawrate": 2, "
 _ANGLES = {"roll": 0, "pitch": 1, "yaw": 2}
 #: Sensors behind an axis by a capital (x_A, y_M, z_R), as watches write them: no ampere, no metre.
 _CAPITALS = {"A": "acc", "M": "mag", "R": "rotrate"}
+#: An axis called by the angle that turns about it.
+_ROLLING = re.compile(r"(.+[\s_.-]|.*[a-z])([RPY]|(?<=[\s_.-])[rpy]|[Rr]oll|[Pp]itch|[Yy]aw|ROLL|PITCH|YAW)")
 #: A gyroscope's axis called by the angle of Euler's about it.
 _ABOUT = re.compile(r"(.+?)[\s_.-]*(phi|theta|psi)", re.IGNORECASE)
 
@@ -162,6 +166,28 @@ def _without_axis(name: str) -> tuple[str, int | None]:
             letter = match[axis].lower()
             return f"{match[base]}{rest}".strip(" _-."), "xyz".find(letter) if letter in "xyz" else int(letter)
     return name, None
+
+
+def about_axes(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names with x, y, z for roll, pitch and yaw where a sensor has all three, as a CanSat's telemetry.
+
+    >>> about_axes(["GYRO_R", "GYRO_P", "GYRO_Y", "ACC_ROLL", "ACC_PITCH"])
+    ('GYRO_X', 'GYRO_Y', 'GYRO_Z', 'ACC_ROLL', 'ACC_PITCH')
+    """
+    read = {k: match for k, name in enumerate(names) if (match := _ROLLING.fullmatch(split_unit(name.strip())[0]))}
+    by_stem: dict[str, dict[str, int]] = {}
+    for k, match in read.items():
+        if sensor_of(stem := match[1].strip(" _.-")) is not None:
+            by_stem.setdefault(stem.casefold(), {})[match[2][0].lower()] = k
+    bases = {base.casefold() for base, axis in map(_without_axis, names) if axis == 0}
+    renamed = list(names)
+    for stem, places in by_stem.items():
+        if set(places) == {"r", "p", "y"} and stem not in bases:
+            for axis, letter in zip("XYZ", "rpy", strict=True):
+                k = places[letter]
+                unit = split_unit(names[k].strip())[1]
+                renamed[k] = f"{read[k][1]}{axis}" + f" [{unit}]" * bool(unit)
+    return tuple(renamed)
 
 
 def read_name(name: str) -> Name:

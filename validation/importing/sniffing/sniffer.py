@@ -17,6 +17,7 @@ from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, 
 from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour
+from discsim.validation.importing.sniffing.by_each_other import by_each_other, in_si
 from discsim.validation.importing.sniffing.clock import (
     SPACING,
     Clock,
@@ -34,11 +35,9 @@ from discsim.validation.importing.sniffing.full_scale import full_scale
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
 from discsim.validation.importing.sniffing.held_gravity import linear_with_gravity, rests, weightless
 from discsim.validation.importing.sniffing.late_clock import late_clock, moved
-from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import (
     Unit,
     accelerometer_unit,
-    counts_per_g,
     gyroscope_unit,
     magnetometer_unit,
 )
@@ -48,7 +47,7 @@ from discsim.validation.importing.sniffing.own_clock import OwnClocks, clocks_of
 from discsim.validation.importing.sniffing.own_place import own_place
 from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
-from discsim.validation.importing.sniffing.pull import arm, doubted, unit_by_pull
+from discsim.validation.importing.sniffing.pull import doubted
 from discsim.validation.importing.sniffing.row_order import order_of
 from discsim.validation.importing.sniffing.seen_turns import (
     OFF_FITTED,
@@ -59,7 +58,6 @@ from discsim.validation.importing.sniffing.seen_turns import (
     seen_turns,
     ticking,
 )
-from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.track import track_of
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
@@ -70,9 +68,6 @@ __all__ = ["sniff"]
 
 #: In this order they stand in the map; rows are counted in the first one's file.
 ORDER = ("gyroscope", "accelerometer", "magnetometer")
-#: A log rests on gravity where its rate is below this, rad/s, in more than this share of its rows: `gravity_norm` looks
-#: for what most windows share, and a rest of a twentieth of a spin is what `rest_norm` takes.
-SLOW, RESTS = 1.0, 0.05
 #: Steps of rows that are tried, over the one that is guessed (0.01 s): 10 to 1000 rows a second, each within a factor
 #: of two of the next, as far as a search goes from it.
 FACTORS = tuple(np.geomspace(0.1, 10.0, 9).tolist())
@@ -306,7 +301,10 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
     notes = []
     chosen = [triple for triple, _ in found.values()]
     for triple in left:
-        if triple in chosen or triple.sensor not in SENSORS:
+        sensor = triple.sensor
+        if sensor is None:  # the same columns of another part tell the same
+            sensor = next((name for name, (one, _) in found.items() if one.is_beside(triple)), None)
+        if triple in chosen or sensor not in SENSORS:
             continue
         if _dead(triple):
             number = float(np.nanmax(triple.values, initial=-np.inf))
@@ -314,8 +312,8 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
         elif triple.sensor == "accelerometer" and (triple.penalty >= NO_READING or weightless(triple)):
             why = "worked out from other readings, or without gravity"
         else:
-            why = "a second one" if triple.sensor in found else "worked out from other readings"
-        note = f"left out: {triple.sensor} in {triple.label} of {triple.numbers.path.name} ({why})"
+            why = "a second one" if sensor in found else "worked out from other readings"
+        note = f"left out: {sensor} in {triple.label} of {triple.numbers.path.name} ({why})"
         notes.append((triple, note))
     return notes[:6]
 
@@ -444,9 +442,10 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
         if sensor == "gyroscope":
             told = turns if clock.column is not None else None
             by = told.by if told else "the field"
-            per_g = counts_per_g(units.get("accelerometer"))
             sure = clock.decision.sure
-            units[sensor] = gyroscope_unit(value, stated, told and told.worth, by, clock=sure, per_g=per_g)
+            units[sensor] = gyroscope_unit(
+                value, stated, told and told.worth, by, clock=sure, beside=units.get("accelerometer")
+            )
         elif sensor == "accelerometer":
             units[sensor] = accelerometer_unit(value, stated)
         else:
@@ -456,8 +455,8 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
             text = f"{stated.scale:.6g} {stated.unit} a count"
             why = units[sensor].decision.why.replace("the header says so", "a line above the table says so")
             units[sensor] = units[sensor]._replace(decision=Decision(f"{sensor} unit", text, "certain", why))
-    units = _by_lift(found, times, units)
-    units, pull = _by_pull(found, times, units)
+    seen, pull = by_each_other(_triples(found), times, units, timed=clock.decision.sure != "guess")
+    units = dict(seen)
     if "gyroscope" in found and turns is None and found["gyroscope"][0].units:
         peak = float(np.nanmax(np.abs(found["gyroscope"][0].values)))
         units = {**units, "gyroscope": doubted(units["gyroscope"], peak, pull)}
@@ -470,7 +469,7 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
         clock, slower = _fitted(clock, units["gyroscope"], found, times)
         times = {sensor: slower * time for sensor, time in times.items()}
         notes = [*filter(None, [counter_note(clock)]), *notes]
-    readings = {sensor: _in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
+    readings = {sensor: in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
     axes = body_axes(readings)
     # a table may be told to turn at just such a rate
     limits = (
@@ -504,7 +503,7 @@ def _offsets(
     if len(set(files.values())) == 1 and not own.clocks:
         return {}
     times = _times(proposal.clock, own, found)
-    readings = {one.sensor: _in_si(one.sensor, one.triple, times[one.sensor], one.unit) for one in proposal.sensors}
+    readings = {one.sensor: in_si(one.sensor, one.triple, times[one.sensor], one.unit) for one in proposal.sensors}
     late = late_clock(readings, {one.sensor: one.axes for one in proposal.sensors})
     if late is None:
         return {}
@@ -517,43 +516,6 @@ def _times(clock: Clock, own: OwnClocks, found: dict[str, tuple[Triple, Decision
         sensor: seconds(own.clocks.get(sensor, clock), triple.numbers)[triple.rows]
         for sensor, (triple, _) in found.items()
     }
-
-
-def _in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading3:
-    """Return a sensor's readings in the recording's unit."""
-    return _reading(time, triple.values * unit.factor(SENSORS[sensor].unit))
-
-
-def _by_lift(
-    found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
-) -> dict[str, Unit]:
-    """Return the units, an accelerometer's by lift where nothing in the log rests on gravity."""
-    if {"gyroscope", "accelerometer"} - set(found):
-        return units
-    gyro = _in_si("gyroscope", found["gyroscope"][0], times["gyroscope"], units["gyroscope"])
-    if np.mean(np.linalg.norm(gyro.value, axis=1) < SLOW) > RESTS:
-        return units
-    triple, unit = found["accelerometer"][0], units["accelerometer"]
-    stated = bool(triple.units) and triple.units[0].unit != COUNTS
-    counts = np.array_equal(sound := triple.values[np.isfinite(triple.values).all(axis=1)], np.round(sound))
-    by_lift = unit_by_lift(unit, along(gyro, times["accelerometer"], triple.values), stated=stated, counts=counts)
-    return units if by_lift is None else {**units, "accelerometer": by_lift}
-
-
-def _by_pull(
-    found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
-) -> tuple[dict[str, Unit], float | None]:
-    """Return the units, a gyroscope's by the pull to the centre where that refutes header or guess, and the arm, m."""
-    if {"gyroscope", "accelerometer"} - set(found):
-        return units, None
-    if not found["gyroscope"][0].units and units["gyroscope"].decision.sure != "guess":
-        return units, None
-    gyro, accel = (
-        _in_si(sensor, found[sensor][0], times[sensor], units[sensor]) for sensor in ("gyroscope", "accelerometer")
-    )
-    seen = arm(gyro, accel)
-    unit = unit_by_pull(units["gyroscope"], seen)
-    return (units, seen) if unit is None else ({**units, "gyroscope": unit}, None)
 
 
 def _on_time(
@@ -579,15 +541,6 @@ def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | N
         worth = stated_worths(triple.numbers.dialect.preamble).get(sensor)
         return worth or stated, worth is not None
     return stated, False
-
-
-def _reading(t: FloatArray, value: FloatArray) -> Reading3:
-    """Return the rows with a time, in its order."""
-    if np.all(np.diff(t) >= 0):
-        return Reading3(t, value)
-    order = np.argsort(t, kind="stable")
-    order = order[np.isfinite(t[order])]
-    return Reading3(t[order], value[order])
 
 
 def _turned(

@@ -28,6 +28,8 @@ __all__ = ["begins", "write_tables"]
 _Record: TypeAlias = Mapping[str, Any]
 
 _BEGINS = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*)?\{\s*[\"']")
+#: What a program's log has before each record: brackets and words, no brace and no more than a line.
+_LOGGED = re.compile(rb"(?:\xef\xbb\xbf)?[^\n{}]{1,120}\{\s*[\"'][^\n]*\}\r?\n")
 #: A list of lists, and one of those in it; numpy prints no commas.
 _LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*\[[^\[\]{}]*,[^\[\]{}]*\]")
 _LIST = re.compile(r"\[[^\[\]{}]*\]")
@@ -51,7 +53,10 @@ _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 def begins(path: Path) -> bool:
     """Tell a file that begins as an object of JSON, or as a list of such or of lists."""
     head = first_bytes(path, 1 << 12)
-    return any(form.match(head) is not None for form in (_BEGINS, _LISTS, _TIMED))
+    if any(form.match(head) is not None for form in (_BEGINS, _LISTS, _TIMED)):
+        return True
+    lines = head.splitlines(keepends=True)[:-1]
+    return len(lines) >= FEWEST and all(_LOGGED.fullmatch(line) is not None for line in lines)
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:

@@ -1,0 +1,83 @@
+"""Units that two sensors of a log show of each other: by lift, by the pull to the centre, by how far gravity turned.
+
+Takes readings as written, their times and the units that sizes show; gives the units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.recording import SENSORS
+from discsim.validation.importing.sniffing.groups import Triple
+from discsim.validation.importing.sniffing.lift import along, unit_by_lift
+from discsim.validation.importing.sniffing.magnitudes import Unit
+from discsim.validation.importing.sniffing.pull import arm, unit_by_pull
+from discsim.validation.importing.sniffing.rests import unit_by_rests
+from discsim.validation.importing.sniffing.spin_axis import Reading3
+from discsim.validation.importing.sniffing.units import COUNTS
+
+__all__ = ["by_each_other", "in_si"]
+
+#: A log rests where more than this share of its rows turns slower than this, rad/s: then gravity at rest tells
+SLOW, RESTS = 1.0, 0.05
+
+
+def by_each_other(
+    found: Mapping[str, Triple], times: Mapping[str, FloatArray], units: Mapping[str, Unit], *, timed: bool
+) -> tuple[Mapping[str, Unit], float | None]:
+    """Return the units as the sensors show them of each other, and the accelerometer's arm by the gyroscope, m.
+
+    ``timed`` is whether the rows' times are no guess. The arm is None where it does not show, or has mended a unit.
+    """
+    if {"gyroscope", "accelerometer"} - set(found):
+        return units, None
+    units = _by_lift(found, times, units)
+    gyro, accel = (_reading(times[sensor], found[sensor].values) for sensor in ("gyroscope", "accelerometer"))
+    if timed and (unit := unit_by_rests(units["gyroscope"], gyro, accel)) is not None:
+        units = {**units, "gyroscope": unit}
+    return _by_pull(found, times, units)
+
+
+def in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading3:
+    """Return a sensor's readings in the recording's unit."""
+    return _reading(time, triple.values * unit.factor(SENSORS[sensor].unit))
+
+
+def _by_lift(
+    found: Mapping[str, Triple], times: Mapping[str, FloatArray], units: Mapping[str, Unit]
+) -> Mapping[str, Unit]:
+    """Return the units, an accelerometer's by lift where nothing in the log rests on gravity."""
+    gyro = in_si("gyroscope", found["gyroscope"], times["gyroscope"], units["gyroscope"])
+    if np.mean(np.linalg.norm(gyro.value, axis=1) < SLOW) > RESTS:
+        return units
+    triple, unit = found["accelerometer"], units["accelerometer"]
+    stated = bool(triple.units) and triple.units[0].unit != COUNTS
+    counts = np.array_equal(sound := triple.values[np.isfinite(triple.values).all(axis=1)], np.round(sound))
+    by_lift = unit_by_lift(unit, along(gyro, times["accelerometer"], triple.values), stated=stated, counts=counts)
+    return units if by_lift is None else {**units, "accelerometer": by_lift}
+
+
+def _by_pull(
+    found: Mapping[str, Triple], times: Mapping[str, FloatArray], units: Mapping[str, Unit]
+) -> tuple[Mapping[str, Unit], float | None]:
+    """Return the units, a gyroscope's by the pull to the centre where that refutes header or guess, and the arm, m."""
+    if not found["gyroscope"].units and units["gyroscope"].decision.sure != "guess":
+        return units, None
+    gyro, accel = (
+        in_si(sensor, found[sensor], times[sensor], units[sensor]) for sensor in ("gyroscope", "accelerometer")
+    )
+    seen = arm(gyro, accel)
+    unit = unit_by_pull(units["gyroscope"], seen)
+    return (units, seen) if unit is None else ({**units, "gyroscope": unit}, None)
+
+
+def _reading(t: FloatArray, value: FloatArray) -> Reading3:
+    """Return the rows with a time, in its order."""
+    if np.all(np.diff(t) >= 0):
+        return Reading3(t, value)
+    order = np.argsort(t, kind="stable")
+    order = order[np.isfinite(t[order])]
+    return Reading3(t[order], value[order])
