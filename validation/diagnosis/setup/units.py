@@ -28,6 +28,10 @@ __all__ = ["ClockDoubt", "clock_doubts", "clock_unit", "sensor_units"]
 NEAR = 2.2
 #: more than the field's own size, with soft iron, turns in no sensor
 _SWING = 1.6
+#: steps are a unit's factor times the resolution to this share: sheets round it, and two decimals of deg/s round a step
+#: of 0.061; and fewest readings whose smallest difference is a step
+_EXACT, _TELLING = 0.03, 100
+_UNITS_OF: Mapping[str, type[Any]] = MappingProxyType({"accelerometer": AccelerometerUnit, "gyroscope": GyroscopeUnit})
 #: stamps that are the units' whole factor away from the stated rate, within this share, are in that unit
 _STAMPS = 0.3
 #: what one sensor's times may be in; a rate that is stated so many times too high by mistake is hardly met
@@ -224,13 +228,23 @@ def _spin_of(recording: Recording) -> float | None:
 
 
 def _steps_ratio(recording: Recording, sensor: str) -> float | None:
-    """Return the step between a sensor's readings over the resolution that its sheet states, where both are known."""
+    """Return the step between a sensor's readings over the resolution that its sheet states, where that is a unit's.
+
+    In another unit steps are the resolution's exactly. A step of 1, 2 or 5 in a decimal place is that of rounding, and
+    of few readings the smallest difference is that of no neighbours.
+    """
     value, stated = _whole(recording, sensor), recording.sheets[sensor].resolution
-    if value is None or not stated:
+    if value is None or not stated or len(value) < _TELLING:
         return None
     steps = np.diff(np.unique(value[:, 0]))
     steps = steps[steps > 1e-9 * float(np.max(np.abs(value)))]
-    return float(np.min(steps)) / stated if steps.size else None
+    if not steps.size:
+        return None
+    step = float(np.min(steps))
+    first = float(f"{step / 10.0 ** np.floor(np.log10(step)):.4g}")
+    ratio, factors = step / stated, UNITS[_UNITS_OF[sensor]].values()
+    exact = min(abs(float(np.log(ratio / factor))) for factor in factors) < np.log1p(_EXACT)
+    return ratio if exact and first not in (1.0, 2.0, 5.0, 10.0) else None
 
 
 def _force_ratio(recording: Recording) -> float | None:

@@ -346,7 +346,7 @@ def gyroscope_unit(
     if peak > 5000 and stated is None and beside is not None and beside.unit == "mg":
         steps = next((one for one in MDPS if np.all(np.abs(value / one - np.rint(value / one)) < 1e-6)), None)
         why = f"beside an accelerometer in mg, as ST's examples print both; up to {peak:.4g}"
-        why += f", all of them multiples of {steps:g}, an ST part's step" * (steps is not None)
+        why += f", all of them multiples of {steps:g}, an ST part's step" if steps is not None else ""
         return Unit("mdeg/s", 1.0, _said(name, "mdeg/s", "guess" if steps is None else "likely", why))
     if (_whole(value) and (peak > 5000 or stated is not None)) or peak * _RAD > LARGEST_RAD_S:
         return _gyroscope_counts(turned, by, "whole numbers" if _whole(value) else "beyond any gyroscope in deg/s")

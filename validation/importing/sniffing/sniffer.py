@@ -16,7 +16,7 @@ from discsim.recording import SENSORS, Plant
 from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
-from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour
+from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour, lines_of_a_record
 from discsim.validation.importing.sniffing.by_each_other import by_each_other, in_si
 from discsim.validation.importing.sniffing.clock import (
     SPACING,
@@ -348,6 +348,8 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
         four = ", ".join(f"'{numbers.table.columns[k]}'" for k in numbers.orientations[0])
         also += f"; {four} are an orientation that was worked out, not what a sensor read: log the gyroscope, too"
         break
+    lines = [lines_of_a_record(file.numbers.values) for file in files if len(file.numbers.names) == 3]
+    also += f"; a record seems to go over {lines[0]} lines: write each on one line" * any(lines[:1])
     if alone := one_axis_rate([file.numbers for file in files]):
         also += f"; {alone} (docs/importing.md)"
     return InputError.at(
