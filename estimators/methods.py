@@ -243,6 +243,9 @@ def all_methods(
         if absent := missing_sensors(recording, name):
             left_out[name] = f"no {', '.join(absent)} in the recording"
             continue
+        if told := _folded(sound.recording, name):
+            left_out[name] = told
+            continue
         try:
             found = _estimate(sound, name, options)
         except InputError as error:

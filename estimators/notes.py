@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from discsim.arrays import FloatArray, sd_by_median
+from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.estimators.fusion import contradictions
 from discsim.estimators.methods import METHODS, Options
 from discsim.estimators.tracking import tracking
 from discsim.estimators.usable import unclipped
+from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording, Samples
 
 __all__ = ["axis_notes", "clock_notes", "field_notes", "folding_notes", "notes_on", "sampling_notes"]
@@ -95,12 +96,31 @@ def folding_notes(recording: Recording) -> list[str]:
             continue
         rate = float(np.median(shown[above]))
         folded = abs((rate + half) % (2 * half) - half)
+        least, seen = "", f"as {np.degrees(folded):.0f} deg/s"
+        if name == "gyroscope" and 2 * np.count_nonzero(_at_limit(recording)[above]) > np.count_nonzero(above):
+            least, seen = "at least ", "as what rate its limit does not tell"
         notes.append(
-            f"{name}: {np.degrees(rate):.0f} deg/s for {100 * share:.0f} % of its readings, above half the "
-            f"magnetometer's sampling rate ({np.degrees(half):.0f} deg/s); fft and likelihood see it folded, as "
-            f"{np.degrees(folded):.0f} deg/s"
+            f"{name}: {least}{np.degrees(rate):.0f} deg/s for {100 * share:.0f} % of its readings, above half the "
+            f"magnetometer's sampling rate ({np.degrees(half):.0f} deg/s); fft and likelihood see it folded, {seen}"
         )
-    return notes
+    return notes or _unseen(recording, half)
+
+
+def _at_limit(recording: Recording) -> BoolArray:
+    """Tell at which readings (n,) of the gyroscope its z stands at its limit."""
+    return np.asarray(recording.sheets["gyroscope"].clipped(recording.need("gyroscope").value)[:, 2])
+
+
+def _unseen(recording: Recording, half: float) -> list[str]:
+    """Say that nothing beside a slow magnetometer tells whether a throw spins faster than it shows."""
+    others = [name for name in ("rate_reference", "gyroscope") if name in recording]
+    placed = "accelerometer" in recording and recording.sheets["accelerometer"].position is not None
+    if others or placed or recording.plant not in ("flight", "free_spin") or half >= FASTEST_SPIN:
+        return []
+    return [
+        f"the magnetometer alone tells the spin, with {half / np.pi:.3g} readings a second: one faster than "
+        f"{np.degrees(half):.0f} deg/s, as throws may have, would show as a slower one, or the other way round"
+    ]
 
 
 def _may_show(recording: Recording, rate: float) -> bool:

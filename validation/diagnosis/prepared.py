@@ -13,7 +13,7 @@ from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.rounded_stamps import evened, unit_of
 from discsim.validation.checking.track_path import holds_height
-from discsim.validation.diagnosis.repeats import fresh
+from discsim.validation.diagnosis.repeats import without_repeats
 from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.throw_ends import free_part
 from discsim.validation.diagnosis.track_ends import flight_of
@@ -46,7 +46,7 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
-        for change in (_fresh, _free, _downwards, _in_flight, _evened):
+        for change in (without_repeats, _free, _downwards, _in_flight, _evened):
             recording, told = change(recording)
             for note in told:
                 notes.setdefault(note, []).append(name)
@@ -62,17 +62,6 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
         _enough(usable[-1], name)
     said = [note if len(where) == len(names) else f"{', '.join(where)}: {note}" for note, where in notes.items()]
     return usable, [*_absent(usable, names), *_unplaced(usable), *said]
-
-
-def _fresh(recording: Recording) -> tuple[Recording, list[str]]:
-    """Return a recording without readings that were written again with the rows of a faster log, and what is said."""
-    samples, sheets, said = dict(recording.samples), dict(recording.sheets), []
-    for sensor, one in recording.samples.items():
-        samples[sensor], rate, note = fresh(sensor, one)
-        if rate is not None:
-            sheets[sensor] = replace(sheets[sensor], rate_hz=rate)
-            said.append(note)
-    return (replace(recording, samples=samples, sheets=sheets), said) if said else (recording, [])
 
 
 def _free(recording: Recording) -> tuple[Recording, list[str]]:

@@ -6,14 +6,27 @@ recording; gives those of fresh readings, by the rule with which logs are import
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from discsim.recording import Samples
-from discsim.validation.importing.cleaning import without_repeats
+from discsim.recording import Recording, Samples
+from discsim.validation.importing import cleaning
 from discsim.validation.importing.held import find_held
 from discsim.validation.importing.readings import Readings
 
-__all__ = ["fresh"]
+__all__ = ["fresh", "without_repeats"]
+
+
+def without_repeats(recording: Recording) -> tuple[Recording, list[str]]:
+    """Return a recording without readings that were written again with the rows of a faster log, and what is said."""
+    samples, sheets, said = dict(recording.samples), dict(recording.sheets), []
+    for sensor, one in recording.samples.items():
+        samples[sensor], rate, note = fresh(sensor, one)
+        if rate is not None:
+            sheets[sensor] = replace(sheets[sensor], rate_hz=rate)
+            said.append(note)
+    return (replace(recording, samples=samples, sheets=sheets), said) if said else (recording, [])
 
 
 def fresh(sensor: str, samples: Samples) -> tuple[Samples, float | None, str]:
@@ -27,7 +40,7 @@ def fresh(sensor: str, samples: Samples) -> tuple[Samples, float | None, str]:
     held = find_held(found.value) if np.any(read) else None
     if held is None:
         return samples, None, ""
-    readings, period, said = without_repeats(sensor, found, held, len(samples), stamped=True)
+    readings, period, said = cleaning.without_repeats(sensor, found, held, len(samples), stamped=True)
     # the first may have been taken up to a row before the first row: no motion is known there
     time = np.maximum(readings.time, samples.t[0])
     ascends = np.diff(time, prepend=-np.inf) > 0.0

@@ -21,6 +21,9 @@ from discsim.result import Result
 from discsim.threads import one_thread
 from discsim.validation.checking.failed_readings import failed_findings, without_failed
 from discsim.validation.checking.finding import doubts_of
+from discsim.validation.checking.readings import reading_findings
+from discsim.validation.checking.statements import statement_findings
+from discsim.validation.diagnosis.repeats import without_repeats
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.estimating.page import write_estimate_page
@@ -122,7 +125,8 @@ def estimate_spin(
     """Estimate the spin rate of one recording by a method, by the best that its sensors allow, or by all.
 
     Readings that failed (-1, 65535) are left out, setup faults (an axis, a unit, an offset in time) mended, and noted;
-    `discsim.estimators.estimate` does without. ``best`` passes over a rate reference that the sensors beside it refute.
+    `discsim.estimators.estimate` does without. A rate reference that the sensors beside it refute is passed over, but
+    where it is asked for. What was written again with a faster sensor's rows counts once.
     Raises `InputError` for an unknown method, more than one recording, or where nothing can be estimated.
     """
     require_type(method, str, "method", f"the name of one: best, all, {', '.join(METHODS)}")
@@ -130,17 +134,27 @@ def estimate_spin(
     if len(given) != 1:
         raise InputError(f"{len(given)} recordings; expected one (take them one after the other)")
     failed = doubts_of(failed_findings(given[0]))
-    setup = find_setup_faults([without_failed(given[0])])
+    sound, repeats = without_repeats(without_failed(given[0]))
+    setup = find_setup_faults([sound])
     data = setup.recordings[0]
-    doubts = list(reference_doubts(data)) if method == "best" else []
+    doubts = [] if method == "rate_reference" else list(reference_doubts(data))
     rates, left_out = estimate_all(believed(data, doubts), method, Options.of(options), progress)
     left_out.update(("rate_reference", f"it {one.what}") for one in doubts if one.sure and one.about_reference)
     notes = [
         *(f"{one}; the estimates are of the rest" for one in failed),
+        *repeats,
         *setup_notes(setup, "the estimates are of"),
-        *all_notes(data),
+        *_errors(data),
+        *all_notes(believed(data, doubts)),
     ]
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
+
+
+def _errors(recording: Recording) -> list[str]:
+    """Return what `discsim check` calls an error in what is stated of a sensor, or in its readings."""
+    found = [*statement_findings(recording), *reading_findings(recording, list(reference_doubts(recording)))]
+    sensors = {one for sensor in recording.samples for one in (sensor, f"[sensors.{sensor}]")}
+    return [one.sentence for one in found if one.severity == "error" and one.where in sensors]
 
 
 def draw_estimates(rates: Sequence[YawRate], name: str, path: Path | None = None) -> Figure:
