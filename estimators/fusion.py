@@ -29,6 +29,7 @@ __all__ = [
     "Agreement",
     "FusionSettings",
     "accelerometer_calibrated",
+    "by_slow_field",
     "compare_sensors",
     "contradictions",
     "fusion",
@@ -329,14 +330,16 @@ def unfolding(recording: Recording, settings: FusionSettings | None = None) -> t
     if len(magnetometer) < 16:
         return 0, True
     fold = 2 * np.pi / magnetometer.interval
-    outside = _may_fold(recording, fold)
-    sought = outside or mostly_clipped(recording)
-    plain = tracks_of(recording, replace(settings.tracking, knots=0.4), unfold=0) if sought else []
+    outside, alone = _may_fold(recording, fold), by_slow_field(recording)
+    sought = outside or mostly_clipped(recording) or alone
+    plain = tracks_of(recording, replace(settings.tracking, knots=KNOTS), unfold=0) if sought else []
     if not plain:
         return 0, True
     middle = float(np.median(np.concatenate([track.rate for track in plain])))
     rates = {k: middle + k * fold for k in (0, -1, 1, -2, 2)}
-    votes = _by_gyroscope(recording, rates, fold, max(plain, key=lambda track: len(track.t)))
+    longest = max(plain, key=lambda track: len(track.t))
+    votes = _by_gyroscope(recording, rates, fold, longest)
+    votes += [_slowing(longest, rates, _slope_sd(longest))] if alone else []
     # a mount that is wrong shows any rate: it is asked where it shows one that the field cannot
     votes += _by_pull(recording, rates, settings) if outside else []
     possible = set(rates)
@@ -392,6 +395,8 @@ def _pull(recording: Recording) -> tuple[float, float, float] | None:
     return force, radius, float(np.mean(clipped))
 
 
+#: Knots of the track by which turns that are missed are sought, s.
+KNOTS = 0.4
 #: No disc is thrown with more spin, rad/s (docs/checking.md).
 FASTEST_THROW = 200.0
 #: A free spin slows down, but with a time constant above two seconds, and what grows by less than this share in a
@@ -399,11 +404,28 @@ FASTEST_THROW = 200.0
 STEEPEST, STEADY = 0.5, 0.02
 
 
-def _slowing(track: Track, rates: Mapping[int, float]) -> set[int]:
-    """Return which of some rates at the middle of a track (rad/s, by their k) are those of a free spin that slows."""
+def _slowing(track: Track, rates: Mapping[int, float], off: float = 0.0) -> set[int]:
+    """Return which of some rates at the middle of a track (rad/s, by their k) are those of a free spin that slows.
+
+    The track's slope may be ``off`` by so much, rad/s^2.
+    """
     slope = float(np.polyfit(track.t, track.rate, 1)[0]) if len(track.t) > 2 else 0.0
-    change = {k: slope / rate for k, rate in rates.items() if 0.0 < abs(rate) < FASTEST_THROW}
-    return {k for k, share in change.items() if -STEEPEST < share < STEADY}
+    change = {k: (slope / rate, off / abs(rate)) for k, rate in rates.items() if 0.0 < abs(rate) < FASTEST_THROW}
+    return {k for k, (share, room) in change.items() if -STEEPEST - room < share < STEADY + room}
+
+
+def _slope_sd(track: Track) -> float:
+    """Return what the slope of a track may be off by, rad/s^2: three sd of a line through its knots."""
+    lasts = float(track.t[-1] - track.t[0]) if len(track.t) > 2 else 0.0
+    knots = max(lasts / KNOTS, 1.0)
+    return float(3.0 * np.median(track.sd) * np.sqrt(12.0 / knots) / lasts) if lasts > 0.0 else np.inf
+
+
+def by_slow_field(recording: Recording) -> bool:
+    """Tell a throw of which nothing but a magnetometer shows the direction of spin, too slow a one for any throw."""
+    half = np.pi / recording.need("magnetometer").interval
+    airborne = recording.plant in ("flight", "free_spin")
+    return airborne and not _spin_readings(recording)[0].size and half < FASTEST_THROW
 
 
 def mostly_clipped(recording: Recording) -> bool:

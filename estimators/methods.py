@@ -16,6 +16,7 @@ from discsim.estimators.fft import FftSettings, fft
 from discsim.estimators.fusion import (
     FusionSettings,
     accelerometer_calibrated,
+    by_slow_field,
     compare_sensors,
     contradictions,
     fusion,
@@ -206,13 +207,15 @@ def _folded(recording: Recording, name: str) -> str:
     """
     if name not in BY_THE_FIELD or "magnetometer" not in recording:
         return ""
+    bounded = mostly_clipped(recording)
     # with the settings that `fusion` has asked with just before, so that it is not worked out again
-    if not mostly_clipped(recording) or unfolding(recording, FusionSettings()) == (0, True):
+    if not (bounded or by_slow_field(recording)) or unfolding(recording, FusionSettings()) == (0, True):
         return ""
     rate = 1.0 / recording.need("magnetometer").interval
+    told = "by the limit of the gyroscope" if bounded else "as it would spin up in the air else, or by its pull,"
     return (
-        f"by the limit of the gyroscope it spins faster than {rate:.3g} readings of a field in a second show: beyond "
-        "half of them it seems to turn more slowly, or the other way"
+        f"{told} it spins faster than {rate:.3g} readings of a field in a second show: beyond half of them it seems to "
+        "turn more slowly, or the other way"
     )
 
 

@@ -331,3 +331,41 @@ def test_where_two_spins_are_beyond_the_gyroscope_none_of_them_is_told():
     assert np.isnan(fusion(told).rate).all()
     with pytest.raises(InputError, match=r"by the limit of the gyroscope it spins faster than 12\.5 readings"):
         estimate(told, "best")
+
+
+def of_a_field_alone(rate_hz: float, rate: float, decay: float, *others: str):
+    """A free spin with a magnetometer of a few readings a second, and perhaps an accelerometer in its place."""
+    spin = Spin(rate=rate, decay=decay, decay_change=0.0, duration=7.0, nutation=0.0)
+    sheets = {"magnetometer": SensorSheet(rate_hz, 0.4, 0.01, 4912.0), "accelerometer": MPU9250["accelerometer"]}
+    sensors = ("magnetometer", *others)
+    return record(spin, np.random.default_rng(2), sheets=sheets, sensors=sensors, plant="free_spin")
+
+
+def test_a_throw_that_seems_to_spin_up_by_a_slow_field_alone_has_no_rate():
+    """At 20 readings a second 3900 deg/s show as -3300 that grow: they were told with a deviation of 8."""
+    told, _ = of_a_field_alone(20.0, 3900.0, 30.0)
+    assert unfolding(told)[1] is False
+    assert np.isnan(fusion(told).rate).all()
+    with pytest.raises(InputError, match=r"as it would spin up in the air else, .* it spins faster than 20 readings"):
+        estimate(told, "best")
+
+
+def test_an_accelerometer_tells_by_how_much_it_is_folded():
+    """Its place is known to a millimetre: the pull alone leaves both 3300 and 3900 deg/s."""
+    told, truth = of_a_field_alone(20.0, 3900.0, 30.0, "accelerometer")
+    found = estimate(told, "best")
+    known = np.isfinite(found.rate)
+    assert np.mean(known) > 0.9
+    assert np.median(np.abs(found.rate[known] - truth.r(found.t[known]))) < np.radians(20.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_slow_field_that_is_not_folded_is_believed(seed):
+    spin = Spin(rate=1500.0, decay=30.0, decay_change=0.0, duration=3.0, nutation=0.0)
+    sheets = {"magnetometer": SensorSheet(20.0, 0.4, 0.01, 4912.0)}
+    told, truth = record(spin, np.random.default_rng(seed), sheets=sheets, sensors=("magnetometer",), plant="free_spin")
+    assert unfolding(told) == (0, True)
+    found = estimate(told, "best")
+    known = np.isfinite(found.rate)
+    assert np.mean(known) > 0.9
+    assert np.median(np.abs(found.rate[known] - truth.r(found.t[known]))) < np.radians(20.0)

@@ -21,7 +21,7 @@ def command(
     limit: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME=NUMBER", help="bias, rms, worst, p95 (deg/s), delay (s), known, within; may repeat."
+            metavar="NAME=NUMBER", help="bias, rms, worst, p95 (deg/s), delay (s), known, covered, within; may repeat."
         ),
     ] = None,
     magnitude: Annotated[bool, typer.Option("--magnitude", help="The rates have no sign: compare magnitudes.")] = False,

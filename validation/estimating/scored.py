@@ -25,9 +25,9 @@ class RateErrors(NamedTuple):
     """How far one rate is from the truth, deg/s where no unit is named.
 
     ``values`` are those within the truth's time, ``outside`` the others; ``known`` is the share of the former that are
-    known; ``delay`` how late it follows
-    changes of the truth, s (NaN where that does not change, or by one slope only). ``within`` is the share of its
-    errors within two of its own standard deviations, NaN where it states none.
+    known, ``covered`` the share of the truth's time that known ones cover, each for a step; ``delay`` how late it
+    follows changes of the truth, s (NaN where that does not change, or by one slope only). ``within`` is the share of
+    its errors within two of its own standard deviations, NaN where it states none.
     """
 
     method: str
@@ -41,6 +41,7 @@ class RateErrors(NamedTuple):
     within: float
     outside: int = 0
     note: str = ""
+    covered: float = 1.0
 
 
 #: figures that may be limited, and what each limit means
@@ -51,9 +52,12 @@ FIGURES: Mapping[str, str] = {
     "p95": "error that 95 % stay below, deg/s",
     "delay": "delay, s, either way",
     "known": "share of values known, at least",
+    "covered": "share of the truth's time with known values, at least",
     "within": "share of errors within two stated sds, at least",
 }
-_AT_LEAST = ("known", "within")
+_AT_LEAST = ("known", "covered", "within")
+#: a rate that covers less of the truth's time is worth a note: windows at either end of a run of 20 s take 6 % of it
+_MOSTLY = 0.9
 #: exceeded limits that the banner of the page names
 _NAMED = 4
 
@@ -236,7 +240,7 @@ def _errors(rate: YawRate, truth: YawRate) -> RateErrors:
     known = float(np.count_nonzero(np.isfinite(rate.rate[covered])) / np.count_nonzero(covered))
     if not np.any(both):
         nothing = (np.nan,) * 6
-        return RateErrors(rate.method, int(covered.sum()), known, *nothing, outside)
+        return RateErrors(rate.method, int(covered.sum()), known, *nothing, outside, covered=0.0)
     measured, actual = (rate.rate[both], true[both]) if rate.signed else (np.abs(rate.rate[both]), np.abs(true[both]))
     error = measured - actual
     size = np.degrees(np.abs(error))
@@ -245,7 +249,7 @@ def _errors(rate: YawRate, truth: YawRate) -> RateErrors:
     slope = np.interp(t[both], truth.t, slope if rate.signed else slope * np.sign(truth.rate))
     still = np.ptp(actual) < 1e-3 * max(float(np.abs(actual).max()), 1e-12)
     delay = float("nan") if still else _delay(t[both], slope, error)
-    sd = rate.sd[both]
+    sd, share = rate.sd[both], _covered(t[both], truth)
     within = float(np.mean(np.abs(error)[sd > 0] <= 2 * sd[sd > 0])) if np.any(sd > 0) else float("nan")
     return RateErrors(
         rate.method,
@@ -258,7 +262,26 @@ def _errors(rate: YawRate, truth: YawRate) -> RateErrors:
         delay,
         within,
         outside,
-        _note(measured, actual, outside, t.size),
+        "; ".join(filter(None, [_note(measured, actual, outside, t.size), _stops(t[both], truth, share)])),
+        share,
+    )
+
+
+def _covered(t: FloatArray, truth: YawRate) -> float:
+    """Return the share of a truth's time that known values at t (n,) s cover, each for the usual step between them."""
+    lasts = float(truth.t[-1] - truth.t[0])
+    if t.size < 2 or lasts <= 0.0:
+        return float(t.size > 1)
+    return float(min(1.0, t.size * np.median(np.diff(t)) / lasts))
+
+
+def _stops(t: FloatArray, truth: YawRate, share: float) -> str:
+    """Say where known values cover a part of the truth's time only; empty where they cover most of it."""
+    if share > _MOSTLY:
+        return ""
+    return (
+        f"known values, {t[0]:g} to {t[-1]:g} s, cover {100 * share:.2g} % of the truth's time, {truth.t[0]:g} to "
+        f"{truth.t[-1]:g} s: all figures are of that part"
     )
 
 

@@ -209,7 +209,8 @@ def rate_csv(rates: Sequence[YawRate]) -> Iterator[str]:
         known, unknown = f"%.9g,{rate.method},%.9g,%.4g\n", f"%.9g,{rate.method},,\n"
         for first in range(0, len(rate), _ROWS):
             part = slice(first, first + _ROWS)
-            rows = zip(rate.t[part].tolist(), rate.rate[part].tolist(), rate.sd[part].tolist(), strict=True)
+            # a first time of -0.0 is zero
+            rows = zip((rate.t[part] + 0.0).tolist(), rate.rate[part].tolist(), rate.sd[part].tolist(), strict=True)
             # row[1] != row[1]: NaN
             yield "".join([unknown % row[0] if row[1] != row[1] else known % row for row in rows])
 

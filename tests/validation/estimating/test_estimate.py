@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from discsim.errors import InputError
 from discsim.estimators import YawRate
 from discsim.recording import Recording, Samples, SensorSheet, read_recording, write_recording
 from discsim.validation.commands.estimate import command
+from discsim.validation.estimating.spin_estimates import estimate_spin
 from discsim.validation.scenarios.method_disagreement import compare
 
 
@@ -38,6 +40,46 @@ def folder(tmp_path):
 def rows(out):
     with (out / "rate.csv").open() as stream:
         return list(csv.DictReader(stream))
+
+
+def test_what_a_check_calls_an_error_and_readings_written_twice_are_told(folder, tmp_path):
+    """The place in millimetres gave 3000 deg/s as 95 without a word; a held field was folded by fft."""
+    recording = read_recording(folder)
+    field = recording.samples["magnetometer"]
+    held = Samples(field.t, np.repeat(field.value[::4], 4, axis=0))
+    place = replace(recording.sheets["accelerometer"], position=np.array([-16.1, 0.0, 0.0]))
+    spoilt = replace(
+        recording,
+        sheets={**recording.sheets, "accelerometer": place},
+        samples={**recording.samples, "magnetometer": held},
+    )
+    found = estimate_spin(spoilt)
+    assert any("16.1 m from the centre" in note for note in found.notes)
+    assert any("rows each (sample and hold): it runs at 25 Hz" in note for note in found.notes)
+    assert len(found.recording.samples["magnetometer"]) == 75
+
+
+def test_all_methods_leave_out_what_the_limit_of_a_gyroscope_refutes(tmp_path):
+    """`all` had the folded rate of a slow field as its headline, which `best` refuses."""
+    rng, rate = np.random.default_rng(1), np.radians(3973.0)
+    t, fast = np.arange(60) / 20, np.arange(600) / 200
+    field = np.stack([30 * np.cos(rate * t), -30 * np.sin(rate * t), 0 * t + 39], axis=1)
+    limit = np.radians(2000.0)
+    sheets = {
+        "magnetometer": SensorSheet(20.0, 0.6, 0.15, 4912.0),
+        "gyroscope": SensorSheet(200.0, 0.003, 0.001, limit),
+    }
+    across = rng.normal(0, 0.003, (600, 2))
+    samples = {
+        "magnetometer": Samples(t, field + rng.normal(0, 0.6, field.shape)),
+        "gyroscope": Samples(fast, np.column_stack([across, np.full(600, limit)])),
+    }
+    made = Recording("rate_table", "made", Environment(), sheets=sheets, samples=samples)
+    with pytest.raises(InputError, match=r"tracking: by the limit of the gyroscope it spins faster than 20 readings"):
+        estimate_spin(made, "all")
+    (note,) = (one for one in estimate_spin(made, "tracking").notes if "above half" in one)
+    assert note.startswith("gyroscope: at least 2000 deg/s for 100 %")
+    assert note.endswith("folded, as what rate its limit does not tell")
 
 
 def test_all_writes_every_method_and_says_which_are_left_out_and_which_contradict(folder, tmp_path, capsys):

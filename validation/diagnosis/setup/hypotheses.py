@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import Axes, BoardRotation, axes_of
+from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 from discsim.validation.diagnosis.setup.relations import Columns, misfit, wanted_force
@@ -346,6 +347,18 @@ def board_effect(matrix: FloatArray) -> Effect:
     return effect_of(BoardRotation(*Rotation.from_matrix(matrix).as_rotvec().tolist()))
 
 
+def _may_be_folded(recording: Recording) -> bool:
+    """Tell a gyroscope at its limit for most of a spin that a slow magnetometer may show as turning the other way.
+
+    The axes of a board that would make up for that mix the readings at the limit into all others, which are gaps then:
+    the only witness against them.
+    """
+    gyroscope, field = recording.get("gyroscope"), recording.get("magnetometer")
+    if gyroscope is None or field is None or not len(gyroscope) or np.pi / field.interval > FASTEST_SPIN:
+        return False
+    return bool(np.mean(np.any(recording.sheets["gyroscope"].clipped(gyroscope.value), axis=1)) > 0.5)
+
+
 def _boards(some: Sequence[Recording]) -> Iterator[Hypothesis]:
     there = [sensor for sensor in BOARD if any(sensor in one for one in some)]
     for turned in board_turns(some):
@@ -354,6 +367,8 @@ def _boards(some: Sequence[Recording]) -> Iterator[Hypothesis]:
         matrix = right_angle if np.linalg.norm(turned - right_angle) < SNAP else turned
         tilt, about = np.arccos(np.clip(matrix[2, 2], -1.0, 1.0)), np.arctan2(matrix[1, 0], matrix[0, 0])
         if tilt < TILT_LEAST and abs(about) < TURN_LEAST:
+            continue
+        if matrix is turned and any(map(_may_be_folded, some)):
             continue
         axes = {sensor: matrix for sensor in there}
         base = _base(some, axes, board_effect(matrix))
