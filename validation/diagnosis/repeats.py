@@ -12,7 +12,7 @@ import numpy as np
 
 from discsim.recording import Recording, Samples
 from discsim.validation.importing import cleaning
-from discsim.validation.importing.held import find_held
+from discsim.validation.importing.held import find_held, with_holes_filled
 from discsim.validation.importing.readings import Readings
 
 __all__ = ["fresh", "without_repeats"]
@@ -36,7 +36,7 @@ def fresh(sensor: str, samples: Samples) -> tuple[Samples, float | None, str]:
     """
     table = samples.value.reshape(len(samples), -1)
     read = ~np.all(np.isnan(table), axis=1)
-    found = Readings(np.flatnonzero(read), samples.t[read], table[read])
+    found = Readings(np.flatnonzero(read), samples.t[read], with_holes_filled(table[read]))
     held = find_held(found.value) if np.any(read) else None
     if held is None:
         return samples, None, ""

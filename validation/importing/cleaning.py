@@ -12,7 +12,14 @@ import numpy as np
 
 from discsim.arrays import IntArray
 from discsim.glitches import FASTEST_SPIN, glitches
-from discsim.validation.importing.held import Held, find_held, find_interpolated, fresh_rows, step_of
+from discsim.validation.importing.held import (
+    Held,
+    find_held,
+    find_interpolated,
+    fresh_rows,
+    step_of,
+    with_holes_filled,
+)
 from discsim.validation.importing.own_times import between_rows, in_step, own_times
 from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.timing import row_timing
@@ -78,6 +85,9 @@ def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stampe
         rate = 1 / row_timing(found.time).interval
     total = len(found.time)
     held = find_held(found.value)
+    if held is not None and np.any(np.isnan(found.value)):
+        found = Readings(found.number, found.time, with_holes_filled(found.value))
+        held = find_held(found.value)
     if held is not None and (gap := np.all(np.isnan(found.value), axis=1)).any():
         # a row without a reading is as one that was lost: what stood on it goes on behind it
         found = found.select(~gap)

@@ -40,12 +40,23 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 
-__all__ = ["Held", "come_evenly", "evidence", "find_held", "find_interpolated", "fresh_rows", "step_of"]
+__all__ = [
+    "Held",
+    "come_evenly",
+    "evidence",
+    "find_held",
+    "find_interpolated",
+    "fresh_rows",
+    "step_of",
+    "with_holes_filled",
+]
 
 #: log likelihood ratio that each kind of evidence must exceed; e^-10 is 5e-5, and both must err at once
 EVIDENCE = 10.0
 #: the same of evenness where one axis is alone
 ALONE = 25.0
+#: axes that a row with a hole and its neighbour must share: noise of many steps hardly ever repeats on two
+ALIKE = 2
 #: rows per block at which the evidence is summed; the last takes all
 BLOCKS = (128, 512, 2048, 1 << 62)
 #: fewest repeats (or fresh rows) in a block that tell of their spacing
@@ -100,6 +111,22 @@ def find_held(value: FloatArray) -> Held | None:
     if best is None and _scattered(same) and (joint := _joint(same, np.all(same, axis=1))) > EVIDENCE:
         best = Held(1 / (1 - _held_share(same, np.all(same, axis=1))), joint, 0.0)
     return best
+
+
+def with_holes_filled(value: FloatArray) -> FloatArray:
+    """Return readings (n, k) with the holes of a row filled from a neighbour that holds the same reading.
+
+    It is the same where all axes that both rows have are, two at least. Of a held reading a row may lose a cell.
+    """
+    whole = value.copy()
+    for ahead in (1, -1):
+        other = np.roll(whole, ahead, axis=0)
+        other[0 if ahead == 1 else -1] = np.nan
+        both = np.isfinite(whole) & np.isfinite(other)
+        same = (both.sum(axis=1) >= ALIKE) & np.all(~both | (whole == other), axis=1)
+        holes = same[:, None] & np.isnan(whole)
+        whole[holes] = other[holes]
+    return whole
 
 
 def evidence(same: BoolArray, size: int) -> tuple[float, float, int, float]:
