@@ -39,6 +39,7 @@ __all__ = [
     "best",
     "best_of",
     "estimate",
+    "folded",
     "missing_sensors",
 ]
 
@@ -200,7 +201,7 @@ def _estimate(sound: Usable, name: str, options: Options) -> YawRate:
     return replace(found, rate=rate, sd=sd)
 
 
-def _folded(recording: Recording, name: str) -> str:
+def folded(recording: Recording, name: str) -> str:
     """Return why a method shows another rate than the spin's, by a gyroscope's limit; empty where it may show that.
 
     What a gyroscope in range says is told beside the rates (`folding_notes`).
@@ -246,7 +247,7 @@ def all_methods(
         if absent := missing_sensors(recording, name):
             left_out[name] = f"no {', '.join(absent)} in the recording"
             continue
-        if told := _folded(sound.recording, name):
+        if told := folded(sound.recording, name):
             left_out[name] = told
             continue
         try:
@@ -259,8 +260,7 @@ def all_methods(
         else:
             left_out[name] = _why_unknown(sound.recording, name, options)
     if not rates:
-        reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
-        raise InputError(f"{recording.path or recording.name}: no method tells the spin ({reasons})")
+        raise InputError(f"{recording.path or recording.name}: no method tells the spin ({_in_words(left_out)})")
     return rates, left_out
 
 
@@ -283,7 +283,7 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
         if absent := missing_sensors(recording, name):
             reasons[name] = f"no {', '.join(absent)}"
             continue
-        if told := _folded(sound.recording, name):
+        if told := folded(sound.recording, name):
             reasons[name] = told
             continue
         try:
@@ -300,11 +300,18 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
         else:
             reasons[name] = _why_unknown(sound.recording, name, options)
     if not candidates:
-        told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
-        raise InputError(f"{recording.path or recording.name}: no method can be used ({told})")
+        raise InputError(f"{recording.path or recording.name}: no method can be used ({_in_words(reasons)})")
     taken = max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
     taken = _with_contradiction(taken, sound.recording)
     return taken, {name: reason for name, reason in reasons.items() if name != taken.method}
+
+
+def _in_words(reasons: Mapping[str, str]) -> str:
+    """Return why methods were left out, those of one reason together."""
+    alike: dict[str, list[str]] = {}
+    for name, reason in reasons.items():
+        alike.setdefault(reason, []).append(name)
+    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in alike.items())
 
 
 def _with_contradiction(taken: YawRate, recording: Recording) -> YawRate:
@@ -337,6 +344,8 @@ def _why_unknown(recording: Recording, name: str, options: Options) -> str:
                 "the accelerometer's place off the spin axis is not stated; add position_m = [x, y, z] to "
                 "[sensors.accelerometer] of recording.toml, or to the import map"
             )
+    if name == "fusion" and (told := folded(recording, BY_THE_FIELD[0])):
+        return told
     if name in ("fusion", "accelerometer_calibrated"):
         against = contradictions(recording)
         if against:

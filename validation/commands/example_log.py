@@ -15,7 +15,7 @@ __all__ = ["command"]
 def command(
     file: Annotated[Path, typer.Argument(help="The CSV file to write; it must not be there.", show_default=False)],
     throws: Annotated[int, typer.Option(min=1, max=20, help="Throws in the log, to headings all round.")] = 1,
-    spin: Annotated[float, typer.Option(min=600.0, max=7000.0, help="Spin rate at release, deg/s.")] = 4200.0,
+    spin: Annotated[float, typer.Option(min=850.0, max=7000.0, help="Spin rate at release, deg/s.")] = 4200.0,
     effect: EffectOption = None,
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 7,
 ) -> None:

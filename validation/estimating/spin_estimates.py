@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from discsim.errors import InputError, require_type
-from discsim.estimators.methods import METHODS, Options, all_methods, best_of, estimate
+from discsim.estimators.methods import METHODS, Options, all_methods, best_of, estimate, folded
 from discsim.estimators.notes import notes_on
 from discsim.estimators.rate import YawRate
 from discsim.estimators.usable import usable
@@ -147,6 +147,8 @@ def estimate_spin(
         *_errors(data),
         *all_notes(believed(data, doubts)),
     ]
+    if told := folded(usable(data).recording, method):
+        notes.append(f"{method}: {told}")
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
 
 

@@ -118,7 +118,12 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     if _IN_TURN.fullmatch(text):
         words = text.split()
         return found + list(zip(words[::2], words[1::2], strict=True))
-    text = _SQUARE.sub(r" (\1)", text)
+    cells = _one_after_another(_SQUARE.sub(r" (\1)", text))
+    return found + cells if cells else []
+
+
+def _one_after_another(text: str) -> list[tuple[str, str]]:
+    """Return the names and cells of a text in which each cell follows its name; empty where it is none."""
     at, owner, units = 0, "", dict[str, str]()
     cells: list[tuple[str, str, str]] = []
     while at < len(text):
@@ -144,7 +149,7 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
             units[shared] = match[3]
         cells += [(shared, name, number) for name, number in zip(named, numbers, strict=True)]
         at = match.end()
-    return found + [(f"{name} ({units[shared]})" if shared in units else name, cell) for shared, name, cell in cells]
+    return [(f"{name} ({units[shared]})" if shared in units else name, cell) for shared, name, cell in cells]
 
 
 def names_of_list(name: str, count: int) -> list[str]:

@@ -104,7 +104,7 @@ def test_mg_and_mdps_without_names_are_no_field_and_no_counts(tmp_path):
     lines, gyro = st_lines()
     log = import_log(written(tmp_path / "teraterm.log", *lines))
     assert_allclose(size(log, "gyroscope"), np.max(np.abs(gyro)), rtol=1e-6)
-    assert "mdeg/s (likely: beside an accelerometer in mg" in log.summary()
+    assert "mdeg/s (likely: multiples of 70, an ST part's step in it" in log.summary()
     assert "magnetometer:" not in log.summary()
 
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import Axes, BoardRotation, axes_of
-from discsim.glitches import FASTEST_SPIN
+from discsim.estimators.fusion import FASTEST_THROW
 from discsim.recording import Recording
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 from discsim.validation.diagnosis.setup.relations import Columns, misfit, wanted_force
@@ -158,7 +158,7 @@ def hypotheses(recordings: Sequence[Recording], price: float = 0.0) -> Ranking:
 
     No hypothesis is tried where the written ones cost less than a ``price``: none could gain that much.
     """
-    some = chosen(recordings)
+    some = [_without_folded_field(one) for one in chosen(recordings)]
     axis = spin_axis(some, "magnetometer")
     main = 2 if axis is None else int(np.argmax(np.abs(axis)))
     if main == 2:
@@ -347,16 +347,19 @@ def board_effect(matrix: FloatArray) -> Effect:
     return effect_of(BoardRotation(*Rotation.from_matrix(matrix).as_rotvec().tolist()))
 
 
-def _may_be_folded(recording: Recording) -> bool:
-    """Tell a gyroscope at its limit for most of a spin that a slow magnetometer may show as turning the other way.
+def _without_folded_field(recording: Recording) -> Recording:
+    """Return a recording without a slow magnetometer beside a gyroscope that is at its limit for most of the time.
 
-    The axes of a board that would make up for that mix the readings at the limit into all others, which are gaps then:
-    the only witness against them.
+    Such a field may turn the other way than the body does, which no axes and no board have to make up for. Those of a
+    board would even mix readings at the limit into all others, and leave gaps: the only witness against them goes.
     """
     gyroscope, field = recording.get("gyroscope"), recording.get("magnetometer")
-    if gyroscope is None or field is None or not len(gyroscope) or np.pi / field.interval > FASTEST_SPIN:
-        return False
-    return bool(np.mean(np.any(recording.sheets["gyroscope"].clipped(gyroscope.value), axis=1)) > 0.5)
+    if gyroscope is None or field is None or not len(gyroscope) or np.pi / field.interval > FASTEST_THROW:
+        return recording
+    clipped = np.any(recording.sheets["gyroscope"].clipped(gyroscope.value), axis=1)
+    if np.mean(clipped) <= 0.5:
+        return recording
+    return replace(recording, samples={name: one for name, one in recording.samples.items() if name != "magnetometer"})
 
 
 def _boards(some: Sequence[Recording]) -> Iterator[Hypothesis]:
@@ -367,8 +370,6 @@ def _boards(some: Sequence[Recording]) -> Iterator[Hypothesis]:
         matrix = right_angle if np.linalg.norm(turned - right_angle) < SNAP else turned
         tilt, about = np.arccos(np.clip(matrix[2, 2], -1.0, 1.0)), np.arctan2(matrix[1, 0], matrix[0, 0])
         if tilt < TILT_LEAST and abs(about) < TURN_LEAST:
-            continue
-        if matrix is turned and any(map(_may_be_folded, some)):
             continue
         axes = {sensor: matrix for sensor in there}
         base = _base(some, axes, board_effect(matrix))

@@ -18,6 +18,8 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
+from discsim.estimators.fusion import FASTEST_THROW
+from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
 
@@ -227,6 +229,13 @@ def _spin_of(recording: Recording) -> float | None:
     return float(np.sum(angle * size) / np.sum(size)) / usual
 
 
+def _folds(recording: Recording) -> bool:
+    """Tell a recording whose spin a magnetometer alone tells, and one too slow for the fastest throws."""
+    field = recording.get("magnetometer")
+    told = recording.command is not None or "rate_reference" in recording
+    return field is not None and not told and np.pi / field.interval < FASTEST_THROW
+
+
 def _steps_ratio(recording: Recording, sensor: str) -> float | None:
     """Return the step between a sensor's readings over the resolution that its sheet states, where that is a unit's.
 
@@ -269,6 +278,8 @@ def _rate_ratio(recording: Recording) -> float | None:
         return _steps_ratio(recording, "gyroscope")
     limit = recording.sheets["gyroscope"].range
     largest = float(np.max(np.abs(value)))
+    if _folds(recording) and largest < FASTEST_SPIN:
+        return None  # the field may show a part of the spin, and the readings are a spin's as they are
     if limit is not None and spin > limit:  # it clips: at its range, in whatever unit
         return largest / limit
     return float(np.sqrt(np.mean(np.sum(value**2, axis=1)))) / spin

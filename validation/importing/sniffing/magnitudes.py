@@ -345,9 +345,9 @@ def gyroscope_unit(
         return Unit(near, 1.0, _said(name, near, "likely", f"{by} turns as fast in this unit"))
     if peak > 5000 and stated is None and beside is not None and beside.unit == "mg":
         steps = next((one for one in MDPS if np.all(np.abs(value / one - np.rint(value / one)) < 1e-6)), None)
-        why = f"beside an accelerometer in mg, as ST's examples print both; up to {peak:.4g}"
-        why += f", all of them multiples of {steps:g}, an ST part's step" if steps is not None else ""
-        return Unit("mdeg/s", 1.0, _said(name, "mdeg/s", "guess" if steps is None else "likely", why))
+        if steps is not None:
+            why = f"multiples of {steps:g}, an ST part's step in it, beside an accelerometer in mg; up to {peak:.4g}"
+            return Unit("mdeg/s", 1.0, _said(name, "mdeg/s", "likely", why))
     if (_whole(value) and (peak > 5000 or stated is not None)) or peak * _RAD > LARGEST_RAD_S:
         return _gyroscope_counts(turned, by, "whole numbers" if _whole(value) else "beyond any gyroscope in deg/s")
     if _whole(value) and (per_g := counts_per_g(beside)) is not None:
