@@ -15,7 +15,7 @@ from discsim.rounded_stamps import evened, unit_of
 from discsim.validation.checking.track_path import holds_height
 from discsim.validation.diagnosis.repeats import without_repeats
 from discsim.validation.diagnosis.selection.candidates import unplaced
-from discsim.validation.diagnosis.throw_ends import free_part
+from discsim.validation.diagnosis.throw_ends import coasting_part, free_part
 from discsim.validation.diagnosis.track_ends import flight_of
 from discsim.validation.identification.initial.smoothing import FEWEST
 from discsim.validation.identification.plants import plant_of
@@ -65,7 +65,11 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
 
 
 def _free(recording: Recording) -> tuple[Recording, list[str]]:
-    """Return a throw without the hand that began or ended it, by its gyroscope, and what was cut off."""
+    """Return a throw without the hand that began or ended it, a rig's run without its spin-up, and what was cut off."""
+    if recording.plant == "spin_down":
+        run = coasting_part(recording)
+        spun = f"the run is cut: its first {run.before:.2f} s, in which it is spun up (time counts from there)."
+        return run.recording, [spun] if run.before else []
     if not plant_of(recording).airborne:
         return recording, []
     cut = free_part(recording)

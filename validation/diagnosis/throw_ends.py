@@ -1,8 +1,9 @@
-"""Throws that were cut out of a log imprecisely: a hand at the beginning, a catch or the ground at the end.
+"""Recordings that were cut out of a log imprecisely: a hand at a throw's beginning, the ground at its end, a spin-up.
 
 Takes a recording; gives the free part of it, with time from there, and what was cut. The rule is the one by which
 throws are found in a long log: over 0.1 s no air force changes the spin by twice its size per second, a hand that
-spins a disc up, catches or drops it does.
+spins a disc up, catches or drops it does. A rig that runs down is slower from then on: what comes before its fastest
+is the spin-up.
 """
 
 from __future__ import annotations
@@ -10,13 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import savgol_filter
 
 from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.recording import Recording, Samples
 
-__all__ = ["CHANGE", "HALF", "SHORTEST", "ThrowCut", "free_part"]
+__all__ = ["CHANGE", "HALF", "SHORTEST", "ThrowCut", "coasting_part", "free_part"]
 
 #: Between half (the fastest decay on record, a rocket's roll: 0.56 1/s) and ten (4000 deg/s out of a hand in 0.1 s).
 CHANGE = 2.0
@@ -35,6 +36,10 @@ _SLOW = 0.5
 _FREE = 0.1
 #: ... and its spin leaves that of the throw by more than this share of it: noise and wobble do not, a hand does
 _OTHER = 0.1
+#: a rig was spun up where it begins below this share of its fastest (no knock doubles a spin), and coasts once it is
+#: below the second for good:
+#: a motor holds a rate to a hundredth
+_BEGUN, _COASTS = 0.5, 0.99
 #: fewest rows of a window that tells a slope
 _FEWEST = 5
 
@@ -69,15 +74,54 @@ def free_part(recording: Recording) -> ThrowCut:
     end = float(t[sure[-1]]) if _held(t, spin, free, slice(stop, t.size), stop - 1) else None
     if start is None and end is None:
         return ThrowCut(recording)
+    before = 0.0 if start is None else start - float(t[0])
+    after = 0.0 if end is None else float(t[-1]) - end
+    return ThrowCut(_between(recording, start, end), before, after)
+
+
+def coasting_part(recording: Recording) -> ThrowCut:
+    """Return the part of a rig's run in which nothing drives it, by its reference or gyroscope; time zero is its start.
+
+    Nothing is cut where it begins near its fastest, or where no sensor in its range shows it.
+    """
+    seen = _run(recording)
+    if seen is None:
+        return ThrowCut(recording)
+    t, spin = seen
+    fastest = float(np.max(spin))
+    if spin[0] > _BEGUN * fastest:
+        return ThrowCut(recording)
+    start = float(t[np.flatnonzero(spin >= _COASTS * fastest)[-1]])
+    if t[-1] - start < SHORTEST:
+        return ThrowCut(recording)
+    return ThrowCut(_between(recording, start, None), start - float(t[0]))
+
+
+def _run(recording: Recording) -> tuple[FloatArray, FloatArray] | None:
+    """Return times (n,) s and sizes (n,) of the spin of a rig, rad/s, without noise; None where nothing shows it."""
+    reference, gyroscope = recording.get("rate_reference"), recording.get("gyroscope")
+    if reference is not None:
+        seen = _spin(Samples(reference.t, reference.value.reshape(len(reference), -1)))
+    elif gyroscope is not None and not np.any(recording.sheets["gyroscope"].clipped(gyroscope.value)):
+        seen = _spin(gyroscope)
+    else:
+        seen = None
+    if seen is None:
+        return None
+    t, spin = seen
+    wide = max(_FEWEST, round(2.0 * HALF / float(np.median(np.diff(t)))))
+    return t, np.asarray(uniform_filter1d(np.abs(spin), wide, mode="nearest"))
+
+
+def _between(recording: Recording, start: float | None, end: float | None) -> Recording:
+    """Return what a recording holds from ``start`` to ``end``, s, time counting from there; None: its own end."""
     zero = start or 0.0
     samples = {
         sensor: Samples(cut.t - zero, cut.value)
         for sensor, one in recording.samples.items()
         for cut in [one.between(-np.inf if start is None else start, np.inf if end is None else end)]
     }
-    before = 0.0 if start is None else start - float(t[0])
-    after = 0.0 if end is None else float(t[-1]) - end
-    return ThrowCut(replace(recording, samples=samples), before, after)
+    return replace(recording, samples=samples)
 
 
 def _spin(gyroscope: Samples) -> tuple[FloatArray, FloatArray] | None:
