@@ -114,11 +114,16 @@ def _doubts(
     """Return what cannot be, or is unlikely, about the hardware (None: not stated here) and what is planned of it."""
     from discsim.disc import Release
     from discsim.rate_tables import RateTable
+    from discsim.recording import Recording
+    from discsim.validation.checking.doubts import reading_doubts
     from discsim.validation.checking.statements import unlikely_flight
     from discsim.validation.identification.plants import PLANTS
     from discsim.validation.identification.plants.plan import Plan
     from discsim.validation.scenarios.profile_files import Profile, speed_note
 
+    given = [] if isinstance(asked, int) else [one for one in asked if isinstance(one, Recording)]
+    if given:
+        return list(reading_doubts(given, [one.name for one in given]))
     plans = [] if isinstance(asked, int) else [one for one in asked if isinstance(one, Plan)]
     if plant == "rate_table":
         asks = {
