@@ -29,6 +29,8 @@ EVERY = (
     effect("mag.time_offset", offset_s=0.03),
     effect("accel.time_offset", offset_s=-0.02),
     effect("gyro.time_offset", offset_s=0.1),
+    effect("track.time_offset", offset_s=0.15),
+    effect("gps.time_offset", offset_s=-0.2),
     effect("board.rotation", rx_rad=0.5, ry_rad=-1.0, rz_rad=2.0),
     effect("site.field", declination_rad=0.3, inclination_rad=-0.1, ratio=0.95),
     effect("clock.units", written_in="ms"),
@@ -41,6 +43,7 @@ def sound(limit: float | None = None, **given: np.ndarray) -> Recording:
         "accelerometer": 30.0 * RNG.standard_normal((21, 3)),
         "gyroscope": 10.0 * RNG.standard_normal((21, 3)),
         "gps": RNG.standard_normal((21, 6)),
+        "track": RNG.standard_normal((21, 3)),
         "rate_reference": RNG.standard_normal(21),
         **given,
     }

@@ -66,12 +66,13 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
 
 def _free(recording: Recording) -> tuple[Recording, list[str]]:
     """Return a throw without the hand that began or ended it, a rig's run without its spin-up, and what was cut off."""
-    if recording.plant == "spin_down":
+    plant = plant_of(recording)
+    if plant.commanded:
+        return recording, []
+    if not plant.airborne:
         run = coasting_part(recording)
         spun = f"the run is cut: its first {run.before:.2f} s, in which it is spun up (time counts from there)."
         return run.recording, [spun] if run.before else []
-    if not plant_of(recording).airborne:
-        return recording, []
     cut = free_part(recording)
     said = []
     if cut.before:

@@ -119,7 +119,7 @@ def with_holes_filled(value: FloatArray) -> FloatArray:
     It is the same where all axes that both rows have are, two at least. Of a held reading a row may lose a cell.
     """
     whole = value.copy()
-    for ahead in (1, -1):
+    for ahead in (1, -1) if len(value) else ():
         other = np.roll(whole, ahead, axis=0)
         other[0 if ahead == 1 else -1] = np.nan
         both = np.isfinite(whole) & np.isfinite(other)

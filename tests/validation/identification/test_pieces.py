@@ -95,6 +95,7 @@ ON_SENSORS = (
     effect("mag.time_offset", offset_s=0.006),
     effect("accel.time_offset", offset_s=-0.007),
     effect("gyro.time_offset", offset_s=0.012),
+    effect("gps.time_offset", offset_s=-0.05),
     effect("board.rotation", rx_rad=0.3, ry_rad=-0.5, rz_rad=1.2),
     effect("site.field", declination_rad=0.2, inclination_rad=-0.1, ratio=1.05),
 )
@@ -104,7 +105,7 @@ COUNTED = {f"{sensor}.dropped_samples" for sensor in ("mag", "accel")} | {
     *("clock.lost_rows", "clock.late_rows", "mag.own_clock", "imu.own_clock", "mag.average")
 }
 #: the module has no track; `tests/validation/diagnosis/test_partly.py` fits one
-TRACKED = {"track.camera"}
+TRACKED = {"track.camera", "track.time_offset"}
 
 
 def values_of(*effects: Effect) -> dict[tuple[str, str], float]:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import Axes, BoardRotation, axes_of
-from discsim.estimators.fusion import FASTEST_THROW
+from discsim.estimators.fusion import FASTEST_THROW, mostly_clipped, unfolding
 from discsim.recording import Recording
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 from discsim.validation.diagnosis.setup.relations import Columns, misfit, wanted_force
@@ -348,16 +348,16 @@ def board_effect(matrix: FloatArray) -> Effect:
 
 
 def _without_folded_field(recording: Recording) -> Recording:
-    """Return a recording without a slow magnetometer beside a gyroscope that is at its limit for most of the time.
+    """Return a recording without a slow magnetometer that the limit of a gyroscope beside it refutes.
 
-    Such a field may turn the other way than the body does, which no axes and no board have to make up for. Those of a
-    board would even mix readings at the limit into all others, and leave gaps: the only witness against them goes.
+    Such a field turns the other way than the body does, or more slowly, which no axes and no board have to make up for.
+    Those of a board would even mix readings at the limit into all others, and leave gaps: the only witness against
+    them goes.
     """
-    gyroscope, field = recording.get("gyroscope"), recording.get("magnetometer")
-    if gyroscope is None or field is None or not len(gyroscope) or np.pi / field.interval > FASTEST_THROW:
+    field = recording.get("magnetometer")
+    if field is None or not len(field) or np.pi / field.interval > FASTEST_THROW or not mostly_clipped(recording):
         return recording
-    clipped = np.any(recording.sheets["gyroscope"].clipped(gyroscope.value), axis=1)
-    if np.mean(clipped) <= 0.5:
+    if unfolding(recording) == (0, True):
         return recording
     return replace(recording, samples={name: one for name, one in recording.samples.items() if name != "magnetometer"})
 

@@ -348,8 +348,10 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
         four = ", ".join(f"'{numbers.table.columns[k]}'" for k in numbers.orientations[0])
         also += f"; {four} are an orientation that was worked out, not what a sensor read: log the gyroscope, too"
         break
-    lines = [lines_of_a_record(file.numbers.values) for file in files if len(file.numbers.names) == 3]
-    also += f"; a record seems to go over {lines[0]} lines: write each on one line" * any(lines[:1])
+    for numbers in (file.numbers for file in files if len(file.numbers.names) == 3):
+        if lines := lines_of_a_record(numbers.values):
+            also += f"; a record seems to go over {lines} lines: write each on one line"
+            break
     if alone := one_axis_rate([file.numbers for file in files]):
         also += f"; {alone} (docs/importing.md)"
     return InputError.at(
