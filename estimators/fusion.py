@@ -34,6 +34,7 @@ __all__ = [
     "contradictions",
     "fusion",
     "mostly_clipped",
+    "slow_field",
     "unfolding",
 ]
 
@@ -421,11 +422,16 @@ def _slope_sd(track: Track) -> float:
     return float(3.0 * np.median(track.sd) * np.sqrt(12.0 / knots) / lasts) if lasts > 0.0 else np.inf
 
 
+def slow_field(recording: Recording) -> bool:
+    """Tell a magnetometer that shows the fastest throws folded."""
+    field = recording.get("magnetometer")
+    return field is not None and np.pi / field.interval < FASTEST_THROW
+
+
 def by_slow_field(recording: Recording) -> bool:
     """Tell a throw of which nothing but a magnetometer shows the direction of spin, too slow a one for any throw."""
-    half = np.pi / recording.need("magnetometer").interval
     airborne = recording.plant in ("flight", "free_spin")
-    return airborne and not _spin_readings(recording)[0].size and half < FASTEST_THROW
+    return airborne and not _spin_readings(recording)[0].size and slow_field(recording)
 
 
 def mostly_clipped(recording: Recording) -> bool:

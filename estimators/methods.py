@@ -202,9 +202,10 @@ def _estimate(sound: Usable, name: str, options: Options) -> YawRate:
 
 
 def folded(recording: Recording, name: str) -> str:
-    """Return why a method shows another rate than the spin's, by a gyroscope's limit; empty where it may show that.
+    """Return why a method shows another rate than the spin's; empty where it may show that.
 
-    What a gyroscope in range says is told beside the rates (`folding_notes`).
+    A gyroscope's limit tells it, or that a throw would spin up by the field alone. What a gyroscope in range says is
+    told beside the rates (`folding_notes`).
     """
     if name not in BY_THE_FIELD or "magnetometer" not in recording:
         return ""

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from discsim.errors import InputError, require_type
-from discsim.estimators.methods import METHODS, Options, all_methods, best_of, estimate, folded
+from discsim.estimators.methods import BY_THE_FIELD, METHODS, Options, all_methods, best_of, estimate, folded
 from discsim.estimators.notes import notes_on
 from discsim.estimators.rate import YawRate
 from discsim.estimators.usable import usable
@@ -25,7 +25,7 @@ from discsim.validation.checking.readings import reading_findings
 from discsim.validation.checking.statements import statement_findings
 from discsim.validation.diagnosis.repeats import without_repeats
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
-from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
+from discsim.validation.diagnosis.setup.reference import ReferenceDoubt, believed, reference_doubts
 from discsim.validation.estimating.page import write_estimate_page
 from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from discsim.validation.reporting.run import json_text
@@ -137,24 +137,26 @@ def estimate_spin(
     sound, repeats = without_repeats(without_failed(given[0]))
     setup = find_setup_faults([sound])
     data = setup.recordings[0]
-    doubts = [] if method == "rate_reference" else list(reference_doubts(data))
-    rates, left_out = estimate_all(believed(data, doubts), method, Options.of(options), progress)
+    refuted = list(reference_doubts(data))
+    doubts = [] if method == "rate_reference" else refuted
+    taken = believed(data, doubts)
+    rates, left_out = estimate_all(taken, method, Options.of(options), progress)
     left_out.update(("rate_reference", f"it {one.what}") for one in doubts if one.sure and one.about_reference)
     notes = [
         *(f"{one}; the estimates are of the rest" for one in failed),
         *repeats,
         *setup_notes(setup, "the estimates are of"),
-        *_errors(data),
-        *all_notes(believed(data, doubts)),
+        *_errors(data, refuted),
+        *all_notes(taken),
     ]
-    if told := folded(usable(data).recording, method):
+    if method in BY_THE_FIELD and (told := folded(usable(taken).recording, method)):
         notes.append(f"{method}: {told}")
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
 
 
-def _errors(recording: Recording) -> list[str]:
+def _errors(recording: Recording, doubts: Sequence[ReferenceDoubt]) -> list[str]:
     """Return what `discsim check` calls an error in what is stated of a sensor, or in its readings."""
-    found = [*statement_findings(recording), *reading_findings(recording, list(reference_doubts(recording)))]
+    found = [*statement_findings(recording), *reading_findings(recording, doubts)]
     sensors = {one for sensor in recording.samples for one in (sensor, f"[sensors.{sensor}]")}
     return [one.sentence for one in found if one.severity == "error" and one.where in sensors]
 

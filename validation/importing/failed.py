@@ -133,8 +133,10 @@ def dead_axis(value: FloatArray) -> int | None:
     if not len(sound):
         return None
     zero = np.flatnonzero(np.all(sound == 0, axis=0))
+    if zero.size != 1:
+        return None
     changes = [np.ptp(column) > STEPS * (step_of(column) or 0.0) and np.ptp(column) > 0 for column in sound.T]
-    return int(zero[0]) if zero.size == 1 and sum(changes) == 2 else None
+    return int(zero[0]) if sum(changes) == 2 else None
 
 
 def _of_no_reading(seen: FloatArray, code: float, codes: FloatArray) -> BoolArray:

@@ -85,9 +85,8 @@ def draw_fault(id: str, case: Case, rng: np.random.Generator) -> Effect:
         return _sized(id, [np.radians(declination), np.radians(dip), 1.0 + size])
     if id == catalogued(Camera).id:
         return _sized(id, [float(np.exp(rng.uniform(np.log(30.0), np.log(120.0)))), *rng.uniform(-40.0, 40.0, 2)])
-    late = float(np.exp(rng.uniform(np.log(0.005), np.log(0.1)))) * rng.choice([-1.0, 1.0])
-    (sign,) = row(id).sign.values() or (np.sign(late),)
-    return _sized(id, [sign * abs(late)])
+    size, drawn = float(np.exp(rng.uniform(np.log(0.005), np.log(0.1)))), rng.choice([-1.0, 1.0])
+    return _sized(id, [size * row(id).sign.get("offset_s", drawn)])
 
 
 def _off(rng: np.random.Generator, least: float, most: float) -> float:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import Axes, BoardRotation, axes_of
-from discsim.estimators.fusion import FASTEST_THROW, mostly_clipped, unfolding
+from discsim.estimators.fusion import mostly_clipped, slow_field, unfolding
 from discsim.recording import Recording
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 from discsim.validation.diagnosis.setup.relations import Columns, misfit, wanted_force
@@ -354,10 +354,7 @@ def _without_folded_field(recording: Recording) -> Recording:
     Those of a board would even mix readings at the limit into all others, and leave gaps: the only witness against
     them goes.
     """
-    field = recording.get("magnetometer")
-    if field is None or not len(field) or np.pi / field.interval > FASTEST_THROW or not mostly_clipped(recording):
-        return recording
-    if unfolding(recording) == (0, True):
+    if not slow_field(recording) or not mostly_clipped(recording) or unfolding(recording) == (0, True):
         return recording
     return replace(recording, samples={name: one for name, one in recording.samples.items() if name != "magnetometer"})
 

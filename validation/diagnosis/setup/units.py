@@ -18,7 +18,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
-from discsim.estimators.fusion import FASTEST_THROW
+from discsim.estimators.fusion import slow_field
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
@@ -231,9 +231,7 @@ def _spin_of(recording: Recording) -> float | None:
 
 def _folds(recording: Recording) -> bool:
     """Tell a recording whose spin a magnetometer alone tells, and one too slow for the fastest throws."""
-    field = recording.get("magnetometer")
-    told = recording.command is not None or "rate_reference" in recording
-    return field is not None and not told and np.pi / field.interval < FASTEST_THROW
+    return recording.command is None and "rate_reference" not in recording and slow_field(recording)
 
 
 def _steps_ratio(recording: Recording, sensor: str) -> float | None:

@@ -99,13 +99,13 @@ def lines_of_a_record(value: FloatArray) -> int:
 
     In such a record the readings of one row are larger than those of another in nearly all records.
     """
-    size = np.linalg.norm(value[np.isfinite(value).all(axis=1)], axis=1)
+    size = np.linalg.norm(value[np.isfinite(value).all(axis=1)][: max(LINES) * MOST], axis=1)
     for lines in LINES:
         records = min(len(size) // lines, MOST)
         if records < RECORDS:
             return 0
         each = size[: records * lines].reshape(records, lines).T
-        larger = [np.mean(one[:, None] > other) for one in each for other in each]
+        larger = [np.mean(one[:, None] > other) for one, other in permutations(each, 2)]
         if max(larger) > LARGER:
             return lines
     return 0

@@ -21,7 +21,8 @@ from discsim.validation.importing.sniffing.units import COUNTS
 
 __all__ = ["by_each_other", "in_si"]
 
-#: A log rests where more than this share of its rows turns slower than this, rad/s: then gravity at rest tells
+#: A log rests on gravity where its rate is below this, rad/s, in more than this share of its rows: `gravity_norm` looks
+#: for what most windows share, and a rest of a twentieth of a spin is what `rest_norm` takes.
 SLOW, RESTS = 1.0, 0.05
 
 

@@ -17,6 +17,7 @@ from discsim.validation.importing.sniffing.other_forms.written import (
     check_size,
     comma_separated,
     first_lines,
+    joined_time,
     write_named,
 )
 
@@ -78,10 +79,11 @@ def _timed(row: dict[str, str]) -> dict[str, str] | None:
     """Return a message with one time in the place of the two parts of its header's stamp; None where it has none."""
     ends = [(f"header_stamp_{one}", f"header_stamp_{other}") for one, other in zip(_SECONDS, _NANOS, strict=True)]
     pair = next((pair for pair in ends if set(pair) <= set(row)), None)
-    if pair is None or not all(row[name].isdecimal() for name in pair):
+    time = "" if pair is None else joined_time(row[pair[0]], row[pair[1]])
+    if pair is None or not time:
         return None
     rest = {name: value for name, value in row.items() if name not in pair}
-    return {"time_s": f"{row[pair[0]]}.{row[pair[1]]:0>9}"} | rest
+    return {"time_s": time} | rest
 
 
 def _unit(name: str) -> str | None:

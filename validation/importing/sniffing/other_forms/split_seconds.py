@@ -16,6 +16,7 @@ from discsim.validation.importing.sniffing.other_forms.written import (
     all_rows,
     comma_separated,
     first_rows,
+    joined_time,
     write_named,
 )
 
@@ -68,8 +69,7 @@ def write_tables(raw: Path, target: Path) -> list[str]:
 
     def joined(row: list[str]) -> list[str]:
         seconds, nanos = (row[k].strip() if k < len(row) else "" for k in pair)
-        whole = seconds.isdecimal() and nanos.isdecimal()
-        return [f"{seconds}.{nanos:0>9}" if whole else "", *(cell for k, cell in enumerate(row) if k not in pair)]
+        return [joined_time(seconds, nanos), *(cell for k, cell in enumerate(row) if k not in pair)]
 
     kept = [name for k, name in enumerate(names) if k not in pair]
     write_named(target, {raw.stem: comma_separated([["time_s", *kept], *map(joined, rows)])})

@@ -22,6 +22,7 @@ __all__ = [
     "first_lines",
     "first_rows",
     "holds_log",
+    "joined_time",
     "read_and_left",
     "rewrite_lines",
     "write_named",
@@ -108,6 +109,15 @@ def rewrite_lines(raw: Path, target: Path, change: Callable[[Iterable[str]], Ite
             written.writelines(f"{line}\n" for line in change(line.rstrip("\n") for line in lines))
     except OSError as error:
         raise InputError.at(raw, None, f"cannot be read ({error}); expected lines of text") from None
+
+
+def joined_time(seconds: str, nanos: str) -> str:
+    """Return whole seconds and nanoseconds as one time in s, no digit lost; empty where either is no whole number.
+
+    >>> joined_time("1721381710", "3441477"), joined_time("5", "")
+    ('1721381710.003441477', '')
+    """
+    return f"{seconds}.{nanos:0>9}" if seconds.isdecimal() and nanos.isdecimal() else ""
 
 
 def holds_log(rows: Iterable[Sequence[Any]]) -> bool:
