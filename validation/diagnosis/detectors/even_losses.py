@@ -11,21 +11,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.validation.diagnosis.detectors.dropped_samples import price_of_places
+from discsim.validation.diagnosis.detectors.walk_of_losses import (
+    by_one_sample,
+    evidence_of_walk,
+    place_of,
+    sd_of_axes,
+)
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import wider_with
 from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.identification.gauss_newton import Fit
-from discsim.validation.identification.noise import NoiseModel
-from discsim.validation.identification.prediction import shown
-from discsim.validation.identification.readings import Readings, group_of
-from discsim.validation.identification.segments import Trajectory
-from discsim.validation.identification.sensor_model import Values, delay
+from discsim.validation.identification.readings import Readings
+from discsim.validation.identification.sensor_model import delay
 
-__all__ = ["beside_losses", "by_one_sample", "lost_as_well", "place_of", "rather_lost", "sd_of_axes"]
+__all__ = ["beside_losses", "lost_as_well", "rather_lost"]
 
 #: variance of what is anywhere within one sample, as of a reading that is rounded to it
 _SAWTOOTH = 1.0 / 12.0
@@ -35,6 +38,8 @@ _OUT_OF_TOLERANCE = 0.01
 #: twice the logarithm of odds that are positive evidence (R. Kass and A. Raftery, Bayes factors, J. Am. Stat. Assoc.
 #: 90, 1995, p. 777): what is named must be likelier, and the other is listed beside it
 _POSITIVE = 2.0
+#: twice the logarithm of odds that are very strong evidence, in the same table: odds of 150 to one
+_VERY_STRONG = 10.0
 
 
 def lost_as_well(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, float | None] | None:
@@ -80,14 +85,16 @@ def rather_lost(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, float
     """Return lost samples as `lost_as_well` does where they are likelier than a clock of a fit, else None.
 
     Where no reading tells the two apart, what a part may be tells: a clock of all recordings is within its tolerance,
-    and the same in all. Losses come at random, and each recording has had its own. Where a fit holds their walk about
-    the clock, it has gained more than it costs.
+    and the same in all. Losses come at random, each recording has had its own, and they walk about the line of a clock.
+    Where that would show, and nothing walks, it is a clock, however slow. Where a fit holds a walk, it has gained more
+    than it costs.
     """
     lost = lost_as_well(fit, candidate) if candidate.recordings is None else None
-    if lost is None or lost[1] > _OUT_OF_TOLERANCE:
+    if lost is None or any(candidate.row.acts_on in one.lost for one in fit.trajectories):
         return lost
-    walks = any(candidate.row.acts_on in one.lost for one in fit.trajectories)
-    return lost if walks or _evidence_of_walk(fit, candidate, lost[2]) > _POSITIVE else None
+    if lost[1] > _OUT_OF_TOLERANCE and evidence_of_walk(fit, candidate) > -_VERY_STRONG:
+        return lost
+    return lost if _evidence_of_unlike_sizes(fit, candidate, lost[2]) > _POSITIVE else None
 
 
 def beside_losses(fit: Fit, candidates: Sequence[CandidateEffect], errors: FloatArray) -> FloatArray:
@@ -105,14 +112,7 @@ def beside_losses(fit: Fit, candidates: Sequence[CandidateEffect], errors: Float
     return errors
 
 
-def place_of(fit: Fit, clock: CandidateEffect) -> int | None:
-    """Return the place of a clock's ratio among a fit's parameters; None where it is no part of the fit."""
-    keys = [(q.group, q.recordings) for q in fit.parameters]
-    wanted = (clock.id, clock.recordings)
-    return keys.index(wanted) if wanted in keys else None
-
-
-def _evidence_of_walk(fit: Fit, candidate: CandidateEffect, sd: float | None) -> float:
+def _evidence_of_unlike_sizes(fit: Fit, candidate: CandidateEffect, sd: float | None) -> float:
     """Return twice the logarithm by which a clock's sizes in each recording are likelier of random losses than of one.
 
     ``sd`` is the error of the share that was lost. One clock makes sizes as unlike as their errors, of a variance v;
@@ -134,20 +134,3 @@ def _of_one_sample(fit: Fit, recording: int, readings: Readings) -> FloatArray:
         return np.full(len(readings.t), np.inf)
     moved, good = by_one_sample(trajectory, values, readings, readings.t - delay(values, sensor, readings.t))
     return np.asarray(np.sum(np.where(good, moved / sd_of_axes(fit.noise, readings), 0.0) ** 2, axis=1))
-
-
-def by_one_sample(
-    trajectory: Trajectory, values: Values, readings: Readings, t: FloatArray
-) -> tuple[FloatArray, BoolArray]:
-    """Return by how much one sample later moves readings (n, k) that were taken at ``t`` (n,) s; which of them count.
-
-    The sensor's rate is known.
-    """
-    later = t + 1.0 / trajectory.recording.sheets[readings.sensor].rate_hz
-    moved = shown(trajectory, values, readings.sensor, later) - shown(trajectory, values, readings.sensor, t)
-    return moved, readings.good & ((t > 0.0) & (later < trajectory.nodes[-1]))[:, None]
-
-
-def sd_of_axes(noise: NoiseModel, readings: Readings) -> FloatArray:
-    """Return the noise (k,) of a sensor's axes."""
-    return np.array([noise[group_of(readings.sensor, axis)].sd for axis in range(readings.value.shape[1])])

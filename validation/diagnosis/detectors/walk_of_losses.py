@@ -13,17 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray
-from discsim.validation.diagnosis.detectors.even_losses import by_one_sample, place_of, sd_of_axes
+from discsim.arrays import BoolArray, FloatArray
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.identification.gauss_newton import Fit, mapped
 from discsim.validation.identification.noise import NoiseModel
-from discsim.validation.identification.prediction import read
-from discsim.validation.identification.readings import Readings
+from discsim.validation.identification.prediction import read, shown
+from discsim.validation.identification.readings import Readings, group_of
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import Values, delay
 
-__all__ = ["price_of_walk", "walked"]
+__all__ = ["by_one_sample", "evidence_of_walk", "place_of", "price_of_walk", "sd_of_axes", "walked"]
 
 #: modes of a Brownian motion (Karhunen and Loeve); the others hold 1/(16 pi^2) of its variance each half
 _MODES = 16
@@ -33,13 +32,15 @@ class _Walk(NamedTuple):
     """A walk of losses in a recording: its modes (n, k) of unit variance in samples, and readings by them.
 
     ``rows`` (m, k) are what the modes change of the readings that count, in noise, ``left`` (m,) what these leave
-    beside a clock without a walk, ``now`` (n,) the walk that a trajectory has.
+    beside a clock without a walk, ``now`` (n,) the walk that a trajectory has. ``smooth`` (m, 3) are a shift of its
+    times, one that grows with time and one with its square, in noise: what a motion may take up.
     """
 
     modes: FloatArray
     rows: FloatArray
     left: FloatArray
     now: FloatArray
+    smooth: FloatArray
 
     @property
     def curvature(self) -> FloatArray:
@@ -59,6 +60,15 @@ class _Walk(NamedTuple):
     def price(self, sizes: FloatArray) -> float:
         """Return what a walk with modes of some sizes (k,) costs, in chi-squared."""
         return float(sizes @ sizes + np.linalg.slogdet(self.curvature)[1])
+
+    @property
+    def evidence(self) -> float:
+        """Twice the logarithm by which readings are likelier with a walk than without, beside what is smooth."""
+        basis = np.linalg.qr(self.smooth)[0]
+        rows = self.rows - basis @ (basis.T @ self.rows)
+        moment = rows.T @ self.left
+        curvature = np.eye(rows.shape[1]) + rows.T @ rows
+        return float(moment @ np.linalg.solve(curvature, moment) - np.linalg.slogdet(curvature)[1])
 
 
 def walked(fit: Fit, clock: CandidateEffect, noise: NoiseModel) -> tuple[Fit, float]:
@@ -80,6 +90,16 @@ def price_of_walk(fit: Fit, clock: CandidateEffect, noise: NoiseModel) -> float:
         return 0.0
     walks = [walk for walk in _walks(fit, clock, noise) if walk is not None]
     return float(sum(walk.price(walk.held) for walk in walks))
+
+
+def evidence_of_walk(fit: Fit, clock: CandidateEffect) -> float:
+    """Return twice the logarithm by which losses at random are likelier than a steady clock, by how they walk.
+
+    Negative where their walk would show, and does not. What a motion may take up of it is left out: a phase, a rate and
+    a friction of each recording. Nothing speaks for either where no walk is worked out.
+    """
+    walks = [walk for walk in _walks(fit, clock, fit.noise) if walk is not None]
+    return float(sum(walk.evidence for walk in walks))
 
 
 def _walks(fit: Fit, clock: CandidateEffect, noise: NoiseModel) -> list[_Walk | None]:
@@ -105,8 +125,34 @@ def _walk(trajectory: Trajectory, values: Values, readings: Readings, share: flo
     moved, good = by_one_sample(trajectory, values, readings, t)
     sd = sd_of_axes(noise, readings)
     left = readings.value - read(trajectory, values, readings) + moved * now[:, None]
+    share_of_time = np.arange(1, count + 1) / count
     order = np.pi * (np.arange(1, _MODES + 1) - 0.5)
     size = np.sqrt(2.0 * count * share / (1.0 - share) ** 2) / order
-    modes = np.sin(np.outer(np.arange(1, count + 1) / count, order)) * size
+    modes = np.sin(np.outer(share_of_time, order)) * size
     rows = (moved / sd)[:, :, None] * modes[:, None, :]
-    return _Walk(modes, rows[good], (left / sd)[good], now)
+    smooth = (moved / sd)[:, :, None] * np.vander(share_of_time, 3)[:, None, :]
+    return _Walk(modes, rows[good], (left / sd)[good], now, smooth[good])
+
+
+def place_of(fit: Fit, clock: CandidateEffect) -> int | None:
+    """Return the place of a clock's ratio among a fit's parameters; None where it is no part of the fit."""
+    keys = [(q.group, q.recordings) for q in fit.parameters]
+    wanted = (clock.id, clock.recordings)
+    return keys.index(wanted) if wanted in keys else None
+
+
+def by_one_sample(
+    trajectory: Trajectory, values: Values, readings: Readings, t: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return by how much one sample later moves readings (n, k) that were taken at ``t`` (n,) s; which of them count.
+
+    The sensor's rate is known.
+    """
+    later = t + 1.0 / trajectory.recording.sheets[readings.sensor].rate_hz
+    moved = shown(trajectory, values, readings.sensor, later) - shown(trajectory, values, readings.sensor, t)
+    return moved, readings.good & ((t > 0.0) & (later < trajectory.nodes[-1]))[:, None]
+
+
+def sd_of_axes(noise: NoiseModel, readings: Readings) -> FloatArray:
+    """Return the noise (k,) of a sensor's axes."""
+    return np.array([noise[group_of(readings.sensor, axis)].sd for axis in range(readings.value.shape[1])])

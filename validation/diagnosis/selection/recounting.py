@@ -57,10 +57,10 @@ def _walked(found: Search, current: ContinuousFit, sensor: str) -> tuple[Search,
     what it costs, beside what was found since, is none.
     """
     clock = next((c for c in current.hypothesis.candidates if (c.row.type, c.row.acts_on) == (ClockRate, sensor)), None)
-    if clock is None or rather_lost(current.fit, clock) is None:
+    if clock is None:
         return found, current
     has = price_of_walk(current.fit, clock, found.relaxed_noise)
-    for _ in range(_RECOUNTS):
+    for _ in range(_RECOUNTS if rather_lost(current.fit, clock) is not None else 0):
         again, cost = walked(current.fit, clock, found.relaxed_noise)
         fitted = _with_times_of(found, current, again, cost - has)
         if not fitted.score < current.score - _SETTLED:
