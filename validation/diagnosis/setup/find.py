@@ -30,7 +30,7 @@ from discsim.validation.diagnosis.setup.hypotheses import (
 from discsim.validation.diagnosis.setup.late_sensor import SHORTEST, LateSensor, late_sensor
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
 from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
-from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
+from discsim.validation.diagnosis.setup.remedy import MapAxes, place_instead, remedy
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
 from discsim.validation.diagnosis.setup.units import clock_doubts, clock_unit, sensor_units
 from discsim.validation.identification.plants import Plant, plant_of
@@ -77,13 +77,15 @@ MOST, MOST_TWINS = 3, 8
 class SetupFault:
     """A fault as an effect of the catalogue, its gain (twice the log likelihood, and on recordings set aside), twins.
 
-    ``twins`` are effects, in place of this one, that these recordings cannot tell from it.
+    ``twins`` are effects, in place of this one, that these recordings cannot tell from it. ``place`` is where the
+    accelerometer would sit on a board that is not turned, m, where that would do as well.
     """
 
     effect: Effect
     gain: float
     heldout_gain: float | None
     twins: tuple[Effect, ...] = ()
+    place: tuple[float, float, float] | None = None
 
     @property
     def id(self) -> str:
@@ -103,8 +105,12 @@ class SetupFault:
     def advice(self, axes: Mapping[str, MapAxes] | None = None) -> str:
         """Return the sentence with the line for an import map that now has these ``axes``."""
         text = said(self.effect)
-        if self.twins:
-            text += "; these recordings cannot tell that from: " + "; ".join(said(one) for one in self.twins)
+        alike = [said(one) for one in self.twins]
+        if self.place is not None:
+            where = ", ".join(f"{axis:.4g}" for axis in self.place)
+            alike.append(f"the accelerometer's position_m is stated wrongly (its sign, say), and is [{where}]")
+        if alike:
+            text += "; these recordings cannot tell that from: " + "; ".join(alike)
         return f"{text}; {remedy(self.effect, axes)}"
 
 
@@ -237,7 +243,8 @@ def with_fault(faults: Sequence[SetupFault], further: SetupFault) -> list[SetupF
     if np.array_equal(both, np.eye(3)):
         return rest
     effect = effect_of(Axes(axes_of(both)), further.effect.row.acts_on)
-    return [*rest, replace(further, effect=effect, gain=max(before.gain, further.gain), twins=())]
+    gain = max(before.gain, further.gain)
+    return [*rest, replace(further, effect=effect, gain=gain, twins=(), place=None)]
 
 
 def suspected_fault(findings: SetupFindings) -> SuspectedFault | None:
@@ -255,7 +262,7 @@ def suspected_fault(findings: SetupFindings) -> SuspectedFault | None:
     if not _gains(ranking.as_written, found[0], _SUSPECT / PRICE):
         return None
     likeliest = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
-    return SuspectedFault(likeliest.effect, likeliest.gain, likeliest.heldout_gain, likeliest.twins)
+    return SuspectedFault(likeliest.effect, likeliest.gain, likeliest.heldout_gain, likeliest.twins, likeliest.place)
 
 
 def setup_notes(findings: SetupFindings, done: str) -> list[str]:
@@ -431,7 +438,9 @@ def _fault(as_written: Hypothesis | None, found: Sequence[Hypothesis], recording
     best, others = _told_apart(tied, recordings, site)
     twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
     gain = float("inf") if before is None else float(np.sum(before) - best.cost)
-    return SetupFault(_effect(best, site), gain, _heldout(before, best, found), tuple(twins[:MOST_TWINS]))
+    effects = (_effect(best, site), *twins[:MOST_TWINS])
+    place = next((at for one in effects if (at := place_instead(one, recordings[0])) is not None), None)
+    return SetupFault(effects[0], gain, _heldout(before, best, found), effects[1:], place)
 
 
 #: most hypotheses that short fits are made of; a twin is refuted where it leaves this many times more

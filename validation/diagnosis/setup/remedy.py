@@ -10,9 +10,11 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects import setup
 from discsim.effects.catalogue import CATALOGUE, Effect, effect
+from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.named import NamedEffect
+from discsim.validation.identification.plants import plant_of
 
-__all__ = ["remedy", "remedy_of"]
+__all__ = ["place_instead", "remedy", "remedy_of"]
 
 #: a map's axes: for each body axis the sensor's column and its sign, None where it was not seen
 MapAxes: TypeAlias = tuple[tuple[int, float] | None, ...]
@@ -23,6 +25,8 @@ _BOARD = ("magnetometer", "accelerometer", "gyroscope")
 _MAP_UNITS = {"mG": "mgauss", "G": "gauss"}
 #: a rotation within this of right angles (root sum of squares) is one that a map's axes can write
 _RIGHT = 0.15
+#: an accelerometer nearer to the axis than this is meant to sit on it, m: a part of 3 mm is soldered no better
+_ON_AXIS = 0.001
 
 
 def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
@@ -70,6 +74,22 @@ def remedy_of(named: NamedEffect) -> str:
         return ""
     sizes = {name: found.value for name, found in named.parameters.items()}
     return remedy(effect(named.id, **sizes, **named.setting))
+
+
+def place_instead(fault: Effect, recording: Recording) -> tuple[float, float, float] | None:
+    """Return where the accelerometer would sit if a board were not turned about z, m; None where it must be turned.
+
+    A disc has no front: a board that is turned about its axis is one that is not, with the accelerometer elsewhere.
+    """
+    sheet = recording.sheets.get("accelerometer")
+    stated = None if sheet is None or "accelerometer" not in recording else sheet.position
+    if stated is None or not plant_of(recording).airborne or not isinstance(fault.value, setup.BoardRotation):
+        return None
+    matrix = setup.board_axes(fault.value)
+    if np.linalg.norm(matrix[:, 2] - [0.0, 0.0, 1.0]) > _RIGHT or np.linalg.norm(stated[:2]) < _ON_AXIS:
+        return None
+    x, y, z = (round(float(axis), 6) + 0.0 for axis in stated @ matrix)
+    return x, y, z
 
 
 def _axes_line(sensor: str, matrix: FloatArray, axes: Mapping[str, MapAxes] | None) -> str:

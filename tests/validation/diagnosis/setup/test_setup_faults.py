@@ -23,6 +23,7 @@ from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, find_s
 from discsim.validation.diagnosis.setup.find import may_be_physics
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, hypotheses
 from discsim.validation.diagnosis.setup.relations import Columns
+from discsim.validation.diagnosis.setup.remedy import place_instead
 from discsim.validation.diagnosis.setup_effects import free_parameters, with_reversed_axes, with_those_borne_out
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
@@ -186,6 +187,31 @@ def test_a_free_spin_tells_the_size_of_a_field_and_no_direction():
     assert [column.name for column in field.columns] == ["ratio"]
     (field,) = [candidate for candidate in candidates_for(throws(seconds=1.0)) if candidate.id == "site.field"]
     assert len(field.columns) == 3
+
+
+def reversed_place(one: Recording) -> Recording:
+    """Return a recording that states its accelerometer on the other side of the axis."""
+    sheet = one.sheets["accelerometer"]
+    assert sheet.position is not None
+    return replace(one, sheets={**one.sheets, "accelerometer": replace(sheet, position=-sheet.position)})
+
+
+def test_a_place_of_the_wrong_sign_stands_beside_the_turned_board_that_reads_the_same():
+    """It was told as a board turned by half a turn alone, and three sensors' axes were to be mended for it."""
+    sound = throws(plant="free_spin", seconds=3.0)
+    (fault,) = find_setup_faults([reversed_place(one) for one in sound]).faults
+    assert fault.id == "board.rotation"
+    assert fault.place == pytest.approx(tuple(sound[0].sheets["accelerometer"].position), abs=1e-6)
+    assert "position_m is stated wrongly" in fault.sentence
+
+
+def test_on_a_rig_a_turned_board_is_no_place():
+    """Its place says where the rig's arm is; of a disc any side may be the front."""
+    turned = effect("board.rotation", rz_rad=np.pi)
+    table, spin = tables()[0], throws(plant="free_spin", seconds=0.2)[0]
+    assert place_instead(turned, table) is None
+    assert place_instead(turned, spin) is not None
+    assert place_instead(effect("board.rotation", rx_rad=np.pi), spin) is None
 
 
 @pytest.mark.parametrize(("scale", "reversed"), [(-1.97, True), (-1.39, False), (-1.0, False)])
