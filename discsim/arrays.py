@@ -24,6 +24,7 @@ __all__ = [
     "sd_by_median",
     "sealed",
     "vector3",
+    "within_half_turn",
 ]
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -118,3 +119,8 @@ def require_array(values: ArrayLike, name: str, expected: str, *shapes: tuple[in
     ):
         raise InputError(f"{name} has shape {array.shape}; expected {expected}")
     return array
+
+
+def within_half_turn(angle: FloatArray) -> FloatArray:
+    """Return angles in rad without their whole turns: from -pi to below pi."""
+    return np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi

@@ -15,10 +15,10 @@ from discsim.validation.importing import cleaning
 from discsim.validation.importing.held import find_held, with_holes_filled
 from discsim.validation.importing.readings import Readings
 
-__all__ = ["fresh", "without_repeats"]
+__all__ = ["fresh", "without_held_readings"]
 
 
-def without_repeats(recording: Recording) -> tuple[Recording, list[str]]:
+def without_held_readings(recording: Recording) -> tuple[Recording, list[str]]:
     """Return a recording without readings that were written again with the rows of a faster log, and what is said."""
     samples, sheets, said = dict(recording.samples), dict(recording.sheets), []
     for sensor, one in recording.samples.items():

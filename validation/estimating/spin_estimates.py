@@ -23,7 +23,7 @@ from discsim.validation.checking.failed_readings import failed_findings, without
 from discsim.validation.checking.finding import doubts_of
 from discsim.validation.checking.readings import reading_findings
 from discsim.validation.checking.statements import statement_findings
-from discsim.validation.diagnosis.repeats import without_repeats
+from discsim.validation.diagnosis.repeats import without_held_readings
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.reference import ReferenceDoubt, believed, reference_doubts
 from discsim.validation.estimating.page import write_estimate_page
@@ -134,7 +134,7 @@ def estimate_spin(
     if len(given) != 1:
         raise InputError(f"{len(given)} recordings; expected one (take them one after the other)")
     failed = doubts_of(failed_findings(given[0]))
-    sound, repeats = without_repeats(without_failed(given[0]))
+    sound, repeats = without_held_readings(without_failed(given[0]))
     setup = find_setup_faults([sound])
     data = setup.recordings[0]
     refuted = list(reference_doubts(data))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discsim.arrays import ComplexArray, FloatArray, IntArray, sd_by_median
+from discsim.arrays import ComplexArray, FloatArray, IntArray, sd_by_median, within_half_turn
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
 from discsim.validation.identification.prediction import shown
@@ -131,8 +131,7 @@ def phase_counts(recording: Recording) -> FloatArray:
     sums, moments = np.sum(weight * windows, axis=1), np.sum(weight * windows * offset, axis=1)
     expected = (second * sums - first * moments) / np.maximum(count * second - first**2, 1e-9)
     extra = np.arange(_IN_A_ROW + 1)
-    off = steps[:, None] - expected[:, None] * (1.0 + extra)
-    off = np.remainder(off + np.pi, 2.0 * np.pi) - np.pi
+    off = within_half_turn(steps[:, None] - expected[:, None] * (1.0 + extra))
     price = np.minimum((off / scatter[:, None]) ** 2, 1e6) + extra * 1.5 * _COST
     seen = (np.abs(expected) > _SEEN * scatter) & (count > _NEIGHBOURS)
     stepped = np.where(seen, np.argmin(price, axis=1), 0)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, within_half_turn
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import ClockRate, HardIron, Lag
@@ -547,8 +547,7 @@ def _apart(site: FloatArray, stated: FloatArray) -> tuple[float, float, float]:
     """Return by how much a field (3,) is turned about down, dips further, and is larger than another."""
     turned = np.arctan2(site[1], site[0]) - np.arctan2(stated[1], stated[0])
     dip = [float(np.arctan2(b[2], np.hypot(b[0], b[1]))) for b in (site, stated)]
-    wrapped = float((turned + np.pi) % (2.0 * np.pi) - np.pi)
-    return wrapped, dip[0] - dip[1], float(np.linalg.norm(site) / np.linalg.norm(stated))
+    return float(within_half_turn(turned)), dip[0] - dip[1], float(np.linalg.norm(site) / np.linalg.norm(stated))
 
 
 # ---------------------------------------------------------------------------------------------- in words

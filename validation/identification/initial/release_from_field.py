@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, within_half_turn
 from discsim.errors import InputError
 from discsim.frames import body_to_ned, euler_angles, multiply, to_body, turn
 from discsim.recording import Recording
@@ -129,7 +129,7 @@ class _Seen:
         axis = body_to_ned(motion.attitude)[:, :, 2]
         field = to_body(motion.attitude, self.n)
         turned = -np.diff(np.arctan2(field[:, 1], field[:, 0])) - GRID * 0.5 * (self.rate[1:] + self.rate[:-1])
-        slips = (np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi) / GRID
+        slips = within_half_turn(turned) / GRID
         off = [(axis @ self.n - self.cosine) / _COSINE, slips / _RATE]
         return within(np.concatenate([*off, self._unusual(axis[0], _velocity(x[1:4]))]))
 
@@ -185,7 +185,7 @@ def _best(left: Callable[[FloatArray], FloatArray], tried: Iterator[FloatArray])
     """Return the best of starts (8,) that are not beside one another."""
     found: list[FloatArray] = []
     for x in sorted(tried, key=lambda x: float(np.sum(np.minimum(np.abs(left(x)), NO_FLIGHT) ** 2))):
-        apart = [np.remainder(x[:2] - other[:2] + np.pi, 2.0 * np.pi) - np.pi for other in found]
+        apart = [within_half_turn(x[:2] - other[:2]) for other in found]
         if not any(np.all(np.abs(off) < _BESIDE) for off in apart):
             found.append(x)
         if len(found) == _FITTED:

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from discsim.aerodynamics import air_wrench, wind
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, within_half_turn
 from discsim.compiled import compiled
 from discsim.frames import body_to_ned
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
@@ -187,7 +187,7 @@ def _apart(table: FloatArray, turns: FloatArray, tried: FloatArray) -> list[tupl
 
         def near(other: tuple[int, int], which: int = which, start: int = start) -> bool:
             apart = [*(turns[which] - turns[other[0]]), tried[start, 0] - tried[other[1], 0]]
-            return bool(np.all(np.abs(np.remainder(np.array(apart) + np.pi, 2.0 * np.pi) - np.pi) < _BESIDE))
+            return bool(np.all(np.abs(within_half_turn(np.array(apart))) < _BESIDE))
 
         if not any(near(other) for other in found):
             found.append((which, start))
