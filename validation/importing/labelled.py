@@ -41,6 +41,8 @@ _OWNER = re.compile(rf"{_NAME}\s*:\s*(?=[xyzXYZ]\s*[:=])")
 _WORD = re.compile(r"^[^\W\d]+\.\s+")
 #: a unit in square brackets before its colon, as ST's examples print it ("Angular rate [mdps]:1.0\t-2.0\t0.5")
 _SQUARE = re.compile(r"\s*\[([^\W\d][^\[\]]*)\]\s*(?=[:=])")
+#: a name in square brackets before all of a line ("[Gyro]: 1 2 3")
+_IN_BRACKETS = re.compile(r"^\[([^\W\d][\w ]*)\]\s*[:=]\s*")
 #: names and numbers in turn with nothing but blanks between ("Mx -1 My -294 Mz 420")
 _IN_TURN = re.compile(rf"(?:[^\W\d]\w*[ \t]+{_NUMBER}(?:[ \t]+|$)){{3,}}")
 _UNIT = re.compile(r" \([^()]*\)$")
@@ -104,6 +106,8 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     [('Gyro x', '0.1'), ('Gyro y', '2'), ('Gyro z', '3')]
     >>> labelled_cells("Rate [dps]: 1 -2 3"), labelled_cells("Mx -1 My 2 Mz 3")
     ([('Rate (dps) x', '1'), ('Rate (dps) y', '-2'), ('Rate (dps) z', '3')], [('Mx', '-1'), ('My', '2'), ('Mz', '3')])
+    >>> labelled_cells("[Gyro]: 1 2 3")
+    [('Gyro x', '1'), ('Gyro y', '2'), ('Gyro z', '3')]
     """
     if line.startswith(BEGINS):
         return sentence_cells(line)
@@ -112,7 +116,7 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
         return [(_TIMES[1], told[2]), reading] if told[2] else [reading]
     begun = stamped(line)
     found = [] if begun is None else [begun[:2]]
-    text = _WORD.sub("", (line if begun is None else begun[2]).strip())
+    text = _IN_BRACKETS.sub(r"\1: ", _WORD.sub("", (line if begun is None else begun[2]).strip()))
     if not text:
         return []
     if _IN_TURN.fullmatch(text):

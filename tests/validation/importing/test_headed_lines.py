@@ -48,7 +48,40 @@ def test_a_serial_monitor_s_stamps_stand_before_both(tmp_path):
     assert_allclose(samples["gyroscope"].t - samples["gyroscope"].t[0], LOG.t, atol=1e-9)
 
 
-@pytest.mark.parametrize("text", ["Gyroscope\nX: 1 Y: 2 Z: 3\n", "x: 1 y: 2\n" * 40, "1,2,3\n" * 40])
+@pytest.mark.parametrize("head", ["[IMU{}]:", "{}:", "---{}---"])
+@pytest.mark.parametrize(
+    "axes", ["{x:.4f} {y:.4f} {z:.4f}", "({x:.4f}, {y:.4f}, {z:.4f})", "{x:.4f}\n{y:.4f}\n{z:.4f}"]
+)
+def test_numbers_below_a_sensor_s_name_are_its_axes(tmp_path, head, axes):
+    """They were one magnetometer of a row for each sensor, by the size of some of them."""
+    raw = tmp_path / "log.txt"
+    raw.write_text("MPU9250 ready\n" + written(head, axes))
+    found = import_log(raw)
+    samples = found.recordings[0].samples
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-5)
+    assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-3)
+    assert_allclose(samples["magnetometer"].value, LOG.mag, atol=1e-3)
+
+
+@pytest.mark.parametrize("time", ["[Time]: {:.0f}\n", "t={:.0f} ms\n"])
+@pytest.mark.parametrize("below", ["\n", " "])
+def test_a_line_of_the_time_goes_with_names_in_brackets(tmp_path, time, below):
+    """On the line of the name, too: the names in brackets were none, and the time was lost."""
+    text = ""
+    for t, gyro, accel in zip(LOG.t, LOG.gyro / DEG, LOG.accel / G0, strict=True):
+        for name, value in (("[Time]", [t]), ("[IMUGyro]", gyro), ("[IMUAcc]", accel)):
+            numbers = " ".join(f"{number:.4f}" for number in value)
+            text += time.format(1000 * t) if name == "[Time]" else f"{name}:{below}{numbers}\n"
+    raw = tmp_path / "log.txt"
+    raw.write_text(text)
+    samples = import_log(raw).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-5)
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text", ["Gyroscope\n" + "1,2,3\n" * 40, "Gyroscope\nX: 1 Y: 2 Z: 3\n", "x: 1 y: 2\n" * 40, "1,2,3\n" * 40]
+)
 def test_other_texts_are_left_as_they_are(tmp_path, text):
     raw = tmp_path / "log.txt"
     raw.write_text(text)

@@ -133,6 +133,47 @@ def test_lists_of_numbers_in_a_list_are_a_table_without_names(tmp_path, text):
     assert_allclose(samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    "before",
+    ["2025-06-01 14:03:{:06.3f} ", "[2025-06-01T14:03:{:06.3f}] imu: ", "14:03:{:06.3f} -> ", "{:.3f},", "{:.3f}: "],
+)
+@pytest.mark.parametrize("printed", [json.dumps, str])
+def test_a_time_before_each_record_is_its_time(tmp_path, before, printed):
+    """It was lost, and the rows were taken as 0.01 s apart."""
+    raw = tmp_path / "log.txt"
+    told = [{key: value for key, value in one.items() if key not in ("ms", "mag")} for one in NESTED]
+    raw.write_text("".join(f"{before.format(t)}{printed(one)}\n" for t, one in zip(LOG.t, told, strict=True)))
+    samples = import_log(raw).recordings[0].samples
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+
+
+def test_a_record_s_own_time_stands_against_one_before_it(tmp_path):
+    """A receiver's program prints when a record came in, in lumps."""
+    raw = tmp_path / "log.txt"
+    raw.write_text(
+        "".join(
+            f"14:03:{20 + t // 500 / 2:04.1f} {json.dumps(one)}\n" for (t, *_), one in zip(ROWS, NESTED, strict=True)
+        )
+    )
+    assert_allclose(import_log(raw).recordings[0].samples["gyroscope"].t, LOG.t, atol=1e-6)
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_several_samples_of_a_message_are_a_row_each(tmp_path, whole):
+    """Of Movesense's four samples a message one was read, or all of them without a time."""
+    messages = []
+    for k in range(0, len(ROWS), 4):
+        lists = [[dict(zip("xyz", row[place], strict=True)) for row in ROWS[k : k + 4]] for place in (1, 2, 3)]
+        names = ("ArrayGyro", "ArrayAcc", "ArrayMagn")
+        messages.append({"Body": {"Timestamp": ROWS[k][0], **dict(zip(names, lists, strict=True))}, "Uri": "IMU9"})
+    raw = tmp_path / "log.json"
+    raw.write_text(json.dumps({"data": messages}) if whole else lines(messages))
+    samples = import_log(raw).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-4)
+
+
 def test_lists_may_have_names_in_the_first_and_break_off(tmp_path):
     whole = json.dumps([[*COLUMNS], *LISTS])
     raw = tmp_path / "log.json"

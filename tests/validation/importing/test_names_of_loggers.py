@@ -287,3 +287,57 @@ def test_a_line_of_sources_below_the_units_is_no_line_of_names(tmp_path):
     read = import_log(tmp_path / "log.csv").recordings[0].samples
     assert_allclose(read["gyroscope"].value, LOG.gyro, atol=1e-4)
     assert_allclose(read["accelerometer"].value, LOG.accel, atol=1e-4)
+
+
+def test_betaflight_s_rates_are_whole_deg_s_beside_counts_of_the_accelerometer(tmp_path):
+    """They were counts of 16 bits: a spin of 2300 deg/s came in as 140. The decoder writes no unit for them."""
+    rates, counts = np.round(LOG.gyro / DEG).astype(int), np.round(2048 * LOG.accel / G0).astype(int)
+    columns = [("loopIteration", np.arange(LOG.t.size)), ("time (us)", np.round(1e6 * LOG.t).astype(int))]
+    columns += [
+        *three([f"gyroADC[{k}]" for k in range(3)], rates),
+        *three([f"accSmooth[{k}]" for k in range(3)], counts),
+    ]
+    log = import_log(write_table(tmp_path / "btfl_001.csv", columns))
+    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=0.51 * DEG)
+
+
+@pytest.mark.parametrize(("per_deg_s", "unit"), [(1.0, "deg/s"), (16.384, "1/16.384 deg/s a count")])
+def test_whole_numbers_that_rest_at_0_beside_counts_are_deg_s(tmp_path, per_deg_s, unit):
+    """The noise of a count shows at rest, that of a whole deg/s does not."""
+    rates = np.round(LOG.gyro / DEG * per_deg_s).astype(int)
+    counts = np.round(2048 * LOG.accel / G0).astype(int)
+    columns = [("time_us", np.round(1e6 * LOG.t).astype(int)), *three(["gx", "gy", "gz"], rates)]
+    log = import_log(write_table(tmp_path / "log.csv", columns + three(["ax", "ay", "az"], counts)))
+    (told,) = [decision for decision in log.decisions if decision.what == "gyroscope unit"]
+    assert told.choice == unit
+    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=0.51 * DEG / per_deg_s)
+
+
+def test_movesense_s_files_are_its_sensors_by_their_names(tmp_path):
+    """The angular velocity was one worked out, and the acceleration, which it calls linear, one without gravity."""
+    folder = tmp_path / "session"
+    for name, value in (
+        ("LinearAcceleration", LOG.accel),
+        ("AngularVelocity", LOG.gyro / DEG),
+        ("MagneticField", LOG.mag),
+    ):
+        columns = [("timestamp", np.round(1e3 * LOG.t).astype(int)), *three(["x", "y", "z"], value)]
+        write_table(folder / f"2025-06-01T14-03-20_174630000192_{name}.csv", columns)
+    samples = import_log(folder).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+    assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-4)
+
+
+def test_powers_of_ten_behind_a_decimal_comma_are_no_units(tmp_path):
+    """Where all of a file's readings were tens (`6,3E+01`) it was left out: a phone's magnetometer."""
+    folder = tmp_path / "export"
+    for name, value, unit in (("Gyroscope", LOG.gyro, "rad/s"), ("Magnetic field", 40.0 + LOG.mag / 100.0, "µT")):
+        rows = [
+            ";".join(f"{cell:.6E}" for cell in (t, *row)).replace(".", ",") for t, row in zip(LOG.t, value, strict=True)
+        ]
+        head = ";".join(['"Time (s)"', *[f'"{name} {axis} ({unit})"' for axis in "xyz"]])
+        folder.mkdir(exist_ok=True)
+        (folder / f"{name}.csv").write_text("\n".join([head, *rows, ""]), "utf-8")
+    log = import_log(folder)
+    assert {*log.recordings[0].samples} == {"gyroscope", "magnetometer"}
+    assert "units stand in its cells" not in log.summary()

@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, made_log, three, write_table
 
 from discsim.errors import InputError
@@ -66,3 +68,14 @@ def test_a_folder_with_another_table_beside_is_one_log(tmp_path):
     write(tmp_path / "day" / "imu.csv", FLIGHT)
     write_table(tmp_path / "day" / "mag.csv", [("t_s", LOG.t[FLIGHT]), *three(["mx", "my", "mz"], LOG.mag[FLIGHT])])
     assert set(import_log(tmp_path / "day").recordings[0].samples) == {"gyroscope", "accelerometer", "magnetometer"}
+
+
+def test_a_file_of_gravity_beside_one_for_each_sensor_makes_no_logs_of_them(tmp_path):
+    """A phone's export with a gravity of its own was said to be five logs of the same columns."""
+    folder = tmp_path / "app"
+    gravity = np.tile([0.0, 0.0, -G0], (LOG.t.size, 1)) + 0.01 * np.sin(LOG.t)[:, None]
+    for name, value in (("Gyroscope", LOG.gyro), ("TotalAcceleration", LOG.accel), ("Gravity", gravity)):
+        write_table(folder / f"{name}.csv", [("seconds_elapsed", LOG.t), *three(["x", "y", "z"], value)])
+    samples = import_log(folder).recordings[0].samples
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+    assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-4)

@@ -13,7 +13,16 @@ from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
 from discsim.validation.importing.sniffing.turning import best_worth, steps_between
 
-__all__ = ["TELLING", "WORTHS", "by_behaviour", "lines_of_a_record", "looks_like", "rests_aslant"]
+__all__ = [
+    "STILL",
+    "TELLING",
+    "WORTHS",
+    "by_behaviour",
+    "gyroscopes_alike",
+    "lines_of_a_record",
+    "looks_like",
+    "rests_aslant",
+]
 
 #: What one reading of a gyroscope may be worth, rad/s: rad/s, deg/s, mdeg/s, and counts of 16 bits over 2000 deg/s.
 WORTHS = (1.0, np.pi / 180, np.pi / 180e3, np.pi / 180 / 16.384)
@@ -27,6 +36,9 @@ LINES, LARGER, RECORDS, MOST = (2, 3, 4), 0.98, 12, 200
 #: Means over 16 rows of one size, to 5 %, most of which lie this far aslant to others (cosine of 20 degrees) are
 #: gravity's: what turns steadily, and so reads a steady rate, keeps its axis.
 ALIKE, ASLANT = 0.05, np.cos(np.radians(20.0))
+#: What is an accelerometer's reading less gravity changes from row to row as it does, noise and all: on each axis with
+#: a correlation near 1, as gravity turns slowly. Two sensors' noise has none, and a twentieth of it in 500 rows.
+GOES_AS = 0.9
 
 
 def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list[tuple[Triple, str, Decision]]:
@@ -54,6 +66,9 @@ def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list
         left = _clear_of(triples, [gyro, field], left)
     found += _at_rest(triples, left, found)
     left = _clear_of(triples, [triples.index(triple) for triple, _, _ in found], left)
+    left = _not_derived(triples, left, found)
+    if len(gyroscopes_alike([triples[k] for k in left])) > 1:
+        left = [k for k in left if _alone(triples[k].values)[0] != "gyroscope"]  # either may be the gyroscope
     for k in list(left):
         sensor, why = _alone(triples[k].values) if k in left else ("", "")
         if sensor and not any(known == sensor for _, known, _ in found):
@@ -81,11 +96,45 @@ def _at_rest(
             guessed.append((triples[best], "accelerometer", _guess("accelerometer", triples[best], why)))
             told["accelerometer"] = triples[best]
     if "accelerometer" in told and "gyroscope" not in told:
-        behind = [triples[k] for k in left if _beside(told["accelerometer"], triples[k])]
+        own = _not_derived(triples, left, [(told["accelerometer"], "accelerometer", None)])
+        behind = [triples[k] for k in own if _beside(told["accelerometer"], triples[k])]
         if behind:
             why = "the three columns beside the accelerometer's"
             guessed.append((behind[0], "gyroscope", _guess("gyroscope", behind[0], why)))
     return guessed
+
+
+def _not_derived(
+    triples: Sequence[Triple], left: Sequence[int], found: Sequence[tuple[Triple, str, Decision | None]]
+) -> list[int]:
+    """Return those of ``left`` that do not go as an accelerometer found: an acceleration without gravity does."""
+    accels = [triple for triple, sensor, _ in found if sensor == "accelerometer"]
+    return [k for k in left if not any(_goes_as(triples[k], accel) for accel in accels)]
+
+
+def _goes_as(one: Triple, other: Triple) -> bool:
+    """Tell whether a triple changes from row to row as another one of its rows does, axis by axis."""
+    if one.numbers is not other.numbers or one.where != other.where:
+        return False
+    both = np.column_stack([one.values, other.values])
+    steps = np.diff(both[np.isfinite(both).all(axis=1)], axis=0)
+    if len(steps) < RECORDS or not np.all(np.ptp(steps, axis=0) > 0):
+        return False
+    return bool(min(np.corrcoef(steps[:, k], steps[:, k + 3])[0, 1] for k in range(3)) > GOES_AS)
+
+
+def gyroscopes_alike(triples: Sequence[Triple], accel: Triple | None = None) -> list[Triple]:
+    """Return the triples that share no column and read as a gyroscope does, by their size alone.
+
+    What goes as an accelerometer ``accel`` is none of them.
+    """
+    alike: list[Triple] = []
+    for triple in triples:
+        moves = _moves(triple.values) and not any(_overlap(triple, one) for one in alike)
+        derived = accel is not None and _goes_as(triple, accel)
+        if moves and not derived and _alone(triple.values)[0] == "gyroscope":
+            alike.append(triple)
+    return alike
 
 
 def _beside(one: Triple, other: Triple) -> bool:

@@ -42,11 +42,15 @@ __all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 MAX_IDS = 20
 #: Rows without which a triple is no sensor: three say nothing of a unit or an axis, and a line of text may hold them.
 FEWEST_ROWS = 4
+#: Rows of a column by which it is told to ascend.
+_ROWS = 12
 #: What SCALED_IMU counts in whole numbers (MAVLink, common messages); ArduPilot's RAW_IMU counts the same.
 _MAVLINK = {"gyroscope": "mrad/s", "accelerometer": "mg", "magnetometer": "mgauss"}
 #: What messages of ROS hold of the two under its own names (sensor_msgs/Imu).
 _ROS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 _OF_ROS = (("angular", "velocity"), ("linear", "acceleration"))
+#: What the decoder of Betaflight's and INAV's blackbox writes; the two log whole deg/s, and no unit with them.
+_BLACKBOX = {"loopiteration", "gyroadc[0]", "gyroadc[1]", "gyroadc[2]"}
 _PLACE = ({"lat", "latitude"}, {"lon", "lng", "long", "longitude"})
 #: a quaternion has turned where one of its numbers has changed by more: by 23 degrees at least
 _TURNED = 0.2
@@ -302,6 +306,8 @@ def _named(
         value = numbers.values[:, list(columns)]
         whole = not np.any(value[np.isfinite(value)] % 1)
         units = [Reading(by_name, _MAVLINK[by_name])] if whole else units
+    if by_name == "gyroscope" and not units and _BLACKBOX <= set(map(str.lower, numbers.names)):
+        units = [Reading(by_name, "deg/s")]
     if by_name in _ROS and not units and numbers.is_of_ros:
         units = [Reading(by_name, _ROS[by_name])]
     if by_name is not None:
@@ -336,8 +342,8 @@ def _unnamed(numbers: Numbers, free: list[int], where: tuple[str, str] | None) -
     source = by_id if own else "the file's name" if file else ""
     runs: list[list[int]] = []
     for k in free:
-        if not np.isfinite(numbers.values[:, k]).any():
-            continue  # a word before each row
+        if not np.isfinite(numbers.values[:, k]).any() or _ascends(numbers.values[:, k]):
+            continue  # a word before each row; a time that is too coarse for a clock
         if not runs or k != runs[-1][-1] + 1:
             runs.append([])
         runs[-1].append(k)
@@ -347,6 +353,12 @@ def _unnamed(numbers: Numbers, free: list[int], where: tuple[str, str] | None) -
         for run in runs
         for k in range(0, len(run) - 2, 3 if len(run) % 3 == 0 else 1)
     ]
+
+
+def _ascends(value: FloatArray) -> bool:
+    """Tell a column that goes up and never down, as a time does: by chance one of `_ROWS` readings is so in 5e8."""
+    sound = value[np.isfinite(value)]
+    return len(sound) >= _ROWS and bool(np.all(np.diff(sound) >= 0) and np.ptp(sound) > 0)
 
 
 def _has_readings(triple: Triple) -> bool:

@@ -37,6 +37,7 @@ def rests(triple: Triple) -> bool:
 def linear_with_gravity(triple: Triple) -> bool:
     """Tell an acceleration that is called linear, and is no reading by that word alone, but rests on gravity.
 
-    ROS calls the specific force so, and people who log its messages do.
+    ROS calls the specific force so, and people who log its messages do; Movesense calls its files so.
     """
-    return triple.penalty == NO_READING and is_called_linear(triple.base) and rests(triple)
+    called = is_called_linear(triple.base) or (not triple.base and is_called_linear(triple.numbers.path.stem))
+    return triple.penalty == NO_READING and called and rests(triple)

@@ -88,9 +88,11 @@ _STAND_BACK = {
 #: Words of what a program converted: it goes before the counts beside it.
 _CONVERTED = {"real", "si", "scaled", "converted"}
 #: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
-_AS_READ = re.compile(r"\b(?:ang(?:ular)?|rot(?:ation(?:al)?)?)[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration")
+_AS_READ = re.compile(
+    r"(?<![a-z])(?:ang(?:ular)?|rot(?:ation(?:al)?)?)[ _.-]?vel(?:ocity)?(?![a-z])|linear_acceleration"
+)
 #: An angular acceleration, which no sensor of a log reads.
-_ANGULAR = re.compile(r"\b(?:ang|angular|rot|rotational)[ _.-]?acc|winkelbeschl|\bacc\w*[ _.-]ang")
+_ANGULAR = re.compile(r"(?<![a-z])(?:ang|angular|rot|rotational)[ _.-]?acc|winkelbeschl|(?<![a-z])acc\w*[ _.-]ang")
 _LINEAR = {"lin", "linear"}
 _TIME_STEMS = (
     "time zeit temps tiempo tempo tijd czas cas czas tid aika zaman vreme время час 时间 時間 시간 timestamp stamp "
@@ -313,7 +315,7 @@ def penalty_of(base: str) -> int:
 
     >>> penalty_of("lin_acc"), penalty_of("acc"), penalty_of("acc_real"), penalty_of("lin_acc_real")
     (9, 0, -1, 9)
-    >>> [penalty_of(name) for name in ("angAcc", "Angular Velocity", "rotation velocity", "rotRate", "rot_acc")]
+    >>> [penalty_of(name) for name in ("angAcc", "Angular Velocity", "7_AngularVelocity", "rotRate", "imu_rot_acc")]
     [9, 0, 0, 0, 9]
     """
     if _ANGULAR.search(_plain(base)):

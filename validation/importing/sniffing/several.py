@@ -39,7 +39,9 @@ def several_logs(raw: Path) -> list[Path]:
         if len(kinds) > 1 or not _sensors(names):
             return []
     one_sensor = all(len(_sensors(names)) == 1 for names in kinds)
-    per_sensor = one_sensor and all(sensor_of_file(path) for path in tables)
+    # beside a file for each of two sensors there may be one of what was worked out (Gravity.csv)
+    called = {sensor_of_file(path) for path in tables} - {None}
+    per_sensor = one_sensor and (len(called) > 1 or all(sensor_of_file(path) for path in tables))
     return [] if len(tables) < 2 or per_sensor else tables
 
 

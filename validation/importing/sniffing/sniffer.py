@@ -58,6 +58,7 @@ from discsim.validation.importing.sniffing.seen_turns import (
     seen_turns,
     ticking,
 )
+from discsim.validation.importing.sniffing.suggestion import either_gyroscope, suggested
 from discsim.validation.importing.sniffing.track import track_of
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
@@ -101,6 +102,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
+    either = "" if "gyroscope" in found else either_gyroscope(unknown, _triples(found).get("accelerometer"))
     apart = clocks_of_files(clock, _triples(found))
     found = {s: found[s] for s in ORDER if s in found and (s in apart.clocks or _on(clock, found[s][0].numbers))}
     sensors = [triple for triple, _ in found.values() if _on(clock, triple.numbers)]
@@ -114,7 +116,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     if not found and fixed is None:
         path = track_of(tables, clock)
         if path is None:
-            raise _nothing(raw, files, failures)
+            raise _nothing(raw, files, failures, either)
         notes = [*notes, *path.notes]
         return Proposal(_name(raw), raw, "flight", layout, clock, (), (), tuple(notes), track=path)
     found, exchanges = _turned_about(clock, found, exchanges)
@@ -122,6 +124,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     own = clocks_of_files(clock, _triples(found)).beside(own_clocks(clock, _triples(found)))
     place = own_place(tables)
     place = place and place.on(moment_of(clock, files[0].numbers))
+    notes += [either] * bool(either)
     notes += [*said, *(note for _, note in others), *apart.notes, *own.notes, *([place.note] if place else [])]
     notes = [*exchanges, *notes]
     sniffed = _Sniffed(raw, plant, layout, own, found, notes)
@@ -335,7 +338,7 @@ def _with_unused(proposal: Proposal, tables: Sequence[Numbers], named: Sequence[
     return replace(proposal, notes=(*asked, *proposal.notes, *unused_columns(tables, used)))
 
 
-def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) -> InputError:
+def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError], either: str) -> InputError:
     rows = max(len(file.numbers.table) for file in files)
     if rows < FEWEST_ROWS:
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
@@ -354,6 +357,9 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
             break
     if alone := one_axis_rate([file.numbers for file in files]):
         also += f"; {alone} (docs/importing.md)"
+    also += f"; {either}" * bool(either)
+    if not also and (names := suggested(files[0].numbers)):
+        also = f"; {names}"
     return InputError.at(
         raw,
         None,

@@ -12,12 +12,14 @@ from pathlib import Path
 from discsim.validation.importing.sniffing.other_forms import (
     array_file,
     database,
+    folded_records,
     framed_lines,
     headed_lines,
     html_tables,
     json_records,
     line_protocol,
     motion_capture,
+    pair_cells,
     quoted_cells,
     record_kinds,
     ros_echo,
@@ -44,12 +46,14 @@ _FORMS = (
     split_seconds,
     record_kinds,
     headed_lines,
+    folded_records,
     framed_lines,
     quoted_cells,
     unit_cells,
+    pair_cells,
 )
-#: What a table of another form may be once more: a row for each value, or cells with quotes or their units.
-_AGAIN = (value_rows, quoted_cells, unit_cells)
+#: What a table of another form may be once more: a row for each value, or cells with quotes, units or two numbers.
+_AGAIN = (value_rows, quoted_cells, unit_cells, pair_cells)
 
 
 def writer_of(path: Path, *, again: bool = False) -> Callable[[Path, Path], list[str]] | None:

@@ -19,8 +19,10 @@ from typing import Any, TypeAlias
 
 from discsim.errors import InputError, printable
 from discsim.validation.importing.cell_texts import number
+from discsim.validation.importing.labelled import stamped
 from discsim.validation.importing.sniffing.names import is_time_name, sensor_of
 from discsim.validation.importing.sniffing.other_forms.written import comma_separated, first_bytes, write_named
+from discsim.validation.importing.stamps import is_stamp
 
 __all__ = ["begins", "write_tables"]
 
@@ -45,6 +47,10 @@ MAX_COLUMNS = 500
 FEWEST = 4
 #: Keys that count rows (pandas' {"ax": {"0": 1.0, "1": 2.0}}) are at least so many.
 _ROWS = 16
+#: What stands in a line before its record is no longer, begins with a number where that is its time, and is told in
+#: this share of records: some lines break off.
+_LONGEST, _TOLD = 120, 0.9
+_COUNTED = re.compile(r"\s*[\[(]?(\d+(?:\.\d+)?)\s*([mun]?s)?[\])]?(?:\s*(?:[,;:|>=]|->?)|\s+|$)")
 #: Names of three numbers in a list.
 _AXES = "xyz"
 _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
@@ -131,8 +137,10 @@ def _timed(text: str) -> tuple[list[_Record], int]:
 def _objects(text: str) -> tuple[list[_Record], int]:
     """Return the objects of a text, whatever stands between them, and how many pieces were none."""
     found: list[_Record] = []
+    stamps: list[tuple[str, str] | None] = []
     broken, at = 0, 0
     while (at := text.find("{", at)) >= 0:
+        begun = at
         try:
             one, at = _DECODER.raw_decode(text, at)
         except (ValueError, RecursionError):
@@ -143,7 +151,40 @@ def _objects(text: str) -> tuple[list[_Record], int]:
             one, at = printed, end
         if isinstance(one, Mapping):
             found.append(one)
-    return found, broken
+            stamps.append(_stamp_before(text[text.rfind("\n", 0, begun) + 1 : begun]))
+    return _stamped(found, stamps), broken
+
+
+def _stamp_before(prefix: str) -> tuple[str, str] | None:
+    """Return the time that stands in a line before its record, with what it is called; None where none does.
+
+    >>> _stamp_before("12:01:33.456 -> "), _stamp_before("[2025-06-01T14:03:20.5] imu: "), _stamp_before("1748.25, ")
+    (('time', '12:01:33.456'), ('time', '2025-06-01T14:03:20.5'), ('time', '1748.25'))
+    >>> _stamp_before("2025-06-01 14:03:20,123 INFO "), _stamp_before("120 ms: "), _stamp_before("imu 3: ")
+    (('time', '2025-06-01 14:03:20.123'), ('time_ms', '120'), None)
+    """
+    if len(prefix) > _LONGEST:
+        return None
+    if (begun := stamped(prefix)) is not None:
+        return begun[0], begun[1]
+    words = prefix.split()
+    for count in (4, 3, 2, 1):
+        text = " ".join(words[:count]).strip("[]()<>,;:|- ")
+        if len(words) >= count and is_stamp(text):
+            return "time", text.replace(",", ".")
+    counted = _COUNTED.match(prefix)
+    return None if counted is None else (f"time_{counted[2]}" if counted[2] else "time", counted[1])
+
+
+def _stamped(records: list[_Record], stamps: Sequence[tuple[str, str] | None]) -> list[_Record]:
+    """Return records with the times that stand before them; as they are where most have none, or one of their own."""
+    told = sum(stamp is not None for stamp in stamps)
+    own = any(is_time_name(name) for one in records[:1] for name, _ in _flat(one))
+    if own or told < max(FEWEST, _TOLD * len(records)):
+        return records
+    return [
+        one if stamp is None else {stamp[0]: stamp[1]} | dict(one) for one, stamp in zip(records, stamps, strict=True)
+    ]
 
 
 def _printed(line: str) -> Any:
@@ -156,6 +197,9 @@ def _printed(line: str) -> Any:
 
 def _tables(objects: Sequence[_Record]) -> dict[str, list[_Record]]:
     """Return records by the name of the list that they stand in; those of no list have none."""
+    batches = [list(_batch(one)) for one in objects]
+    if sum(map(len, batches)) >= FEWEST:
+        return {"": [row for rows in batches for batch in rows for row in batch]}
     inner: dict[str, list[_Record]] = {}
     for one in objects:
         for name, rows in _lists(one):
@@ -165,6 +209,33 @@ def _tables(objects: Sequence[_Record]) -> dict[str, list[_Record]]:
     if len(objects) == 1 and (columns := _columns(objects[0])):
         return columns
     return {"": list(objects)}
+
+
+def _batch(value: Any) -> Iterator[list[_Record]]:
+    """Yield the samples of each message that has a time and several samples of each sensor, as Movesense sends them.
+
+    All samples of a message have its time. Lists of samples with times of their own, or of unlike lengths, are none.
+    """
+    if isinstance(value, list):
+        for one in value:
+            yield from _batch(one)
+    if not isinstance(value, Mapping):
+        return
+    times = {key: part for key, part in value.items() if is_time_name(str(key)) and isinstance(part, str)}
+    lists = {key: part for key, part in value.items() if _are_samples(part)}
+    if times and lists and len({*map(len, lists.values())}) == 1:
+        count = len(next(iter(lists.values())))
+        yield [times | {key: rows[k] for key, rows in lists.items()} for k in range(count)]
+        return
+    for part in value.values():
+        yield from _batch(part)
+
+
+def _are_samples(value: Any) -> bool:
+    """Tell a list of objects of numbers in which there is no time."""
+    if not isinstance(value, list) or not value or not all(isinstance(one, Mapping) for one in value):
+        return False
+    return all(isinstance(part, str) and not is_time_name(str(key)) for one in value for key, part in one.items())
 
 
 def _lists(value: Any, name: str = "") -> Iterator[tuple[str, list[_Record]]]:

@@ -24,8 +24,8 @@ from discsim.validation.importing.sniffing.other_forms.written import (
 
 __all__ = ["begins", "write_tables"]
 
-#: A number and what stands behind it: no digit, and no sign that would make it a date or a time.
-_CELL = re.compile(rf"\s*({NUMBER})\s*([^\s\d:.,;/-][^\s:;]*(?: [^\s\d:;][^\s:;]*)?)\s*")
+#: A number and what stands behind it: no digit, no sign that would make it a date or a time, and no power of ten.
+_CELL = re.compile(rf"\s*({NUMBER})\s*(?![eE][-+]?\d)([^\s\d:.,;/-][^\s:;]*(?: [^\s\d:;][^\s:;]*)?)\s*")
 _PLAIN = re.compile(rf"\s*(?:{NUMBER})?\s*")
 #: The fewest rows below the names, and the columns with a unit without which nothing is moved.
 _FEWEST, _COLUMNS = 3, 3

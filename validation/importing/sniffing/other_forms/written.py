@@ -63,13 +63,13 @@ def first_lines(path: Path) -> tuple[str, list[str]]:
     return encoding, _ENDS.split(head.decode(encoding, "replace"))[:-1]
 
 
-def first_rows(path: Path) -> Iterator[tuple[str, str, list[list[str]]]]:
+def first_rows(path: Path, most: int = FIRST_ROWS) -> Iterator[tuple[str, str, list[list[str]]]]:
     """Yield encoding, separator and first rows of cells by each separator that makes rows of one length of a file.
 
-    A line of names is among them, and at most `FIRST_ROWS` others. Nothing where the file holds zeros, as no text does.
+    A line of names is among them, and at most ``most`` others. Nothing where the file holds zeros, as no text does.
     """
     encoding, lines = first_lines(path)
-    lines = [line for line in lines if line.strip()][: FIRST_ROWS + 1]
+    lines = [line for line in lines if line.strip()][: most + 1]
     for separator in ";\t|,":
         try:
             rows = list(csv.reader(lines, delimiter=separator))
