@@ -41,6 +41,9 @@ _OWNER = re.compile(rf"{_NAME}\s*:\s*(?=[xyzXYZ]\s*[:=])")
 _WORD = re.compile(r"^[^\W\d]+\.\s+")
 #: a unit in square brackets before its colon, as ST's examples print it ("Angular rate [mdps]:1.0\t-2.0\t0.5")
 _SQUARE = re.compile(r"\s*\[([^\W\d][^\[\]]*)\]\s*(?=[:=])")
+#: a time before the first name, with its unit perhaps ("120: ax=1", "0.5 s, Acc: 1 2 3"): three cells must follow
+_FIRST = re.compile(r"^[\[(]?(\d+(?:\.\d+)?)(?:\s*([mun]?s)\b)?[\])]?(?:\s*[:,;|>]|\s*->?)?\s+(?=[^\W\d])")
+_AFTER = 3
 #: a name in square brackets before all of a line ("[Gyro]: 1 2 3")
 _IN_BRACKETS = re.compile(r"^\[([^\W\d][\w ]*)\]\s*[:=]\s*")
 #: names and numbers in turn with nothing but blanks between ("Mx -1 My -294 Mz 420")
@@ -106,8 +109,8 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     [('Gyro x', '0.1'), ('Gyro y', '2'), ('Gyro z', '3')]
     >>> labelled_cells("Rate [dps]: 1 -2 3"), labelled_cells("Mx -1 My 2 Mz 3")
     ([('Rate (dps) x', '1'), ('Rate (dps) y', '-2'), ('Rate (dps) z', '3')], [('Mx', '-1'), ('My', '2'), ('Mz', '3')])
-    >>> labelled_cells("[Gyro]: 1 2 3")
-    [('Gyro x', '1'), ('Gyro y', '2'), ('Gyro z', '3')]
+    >>> labelled_cells("[Gyro]: 1 2 3"), labelled_cells("120: ax=1 ay=2 az=3")[:2]
+    ([('Gyro x', '1'), ('Gyro y', '2'), ('Gyro z', '3')], [('time', '120'), ('ax', '1')])
     """
     if line.startswith(BEGINS):
         return sentence_cells(line)
@@ -119,6 +122,10 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     text = _IN_BRACKETS.sub(r"\1: ", _WORD.sub("", (line if begun is None else begun[2]).strip()))
     if not text:
         return []
+    if not found and (first := _FIRST.match(text)) is not None:
+        cells = labelled_cells(text[first.end() :])
+        known = len(cells) >= _AFTER and cells[0][0] not in _TIMES
+        return [(f"time ({first[2]})" if first[2] else "time", first[1]), *cells] if known else []
     if _IN_TURN.fullmatch(text):
         words = text.split()
         return found + list(zip(words[::2], words[1::2], strict=True))

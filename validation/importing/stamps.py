@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
 import numpy as np
@@ -23,6 +23,9 @@ _TIME_OF_DAY = re.compile(
     r"T?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d+)|:(\d{1,3}))?\s*([AaPp])?(?(6)\.?[Mm]\.?)"
     r"\s*(?:Z|[+-]\d{2}:?\d{2}|[A-Z]{3,4})?"
 )
+#: Digits behind a third colon; a video's count of frames there ends below the frames of a second, 60 at most.
+_THIRD = re.compile(r"\d:\d{2}:\d{2}:(\d{1,3})(?!\d)")
+_NO_FRAMES = "60"
 #: Minutes and seconds, as spreadsheets shorten a time of day.
 _MINUTES = re.compile(r"(\d{1,3}):(\d{2})[.,](\d+)")
 #: Days and a time behind them, as pandas and Python write what went by: 0 days 00:00:05.25, 1 day, 0:00:05.
@@ -107,13 +110,17 @@ def stamp_seconds(cells: Iterable[str]) -> tuple[FloatArray, IntArray]:
     """Return the seconds (n,) of dates and times as `iso_seconds` does, NaN where one is neither.
 
     Of times of the day among dates the day is that of the dated cell before (the first: behind) that is nearest; the
-    second array are their rows.
+    second array are their rows. Behind a third colon stand hundredths, as Kinovea writes them, where all cells have two
+    digits there, `01` as well as 60 and more: milliseconds have one to three.
 
     >>> stamp_seconds(["2001-06-01 23:59:59", "00:00:01", "x"])[0] - 517 * 86400
     array([86399., 86401.,    nan])
+    >>> stamp_seconds(["0:00:01:04", "0:00:01:96"])[0], stamp_seconds(["0:00:01:4", "0:00:01:96"])[0]
+    (array([1.04, 1.96]), array([1.004, 1.096]))
     """
-    found = [iso_seconds(cell) for cell in cells]
-    time = np.array([np.nan if one is None else one for one in found], dtype=np.float64)
+    texts = list(cells)
+    found = [iso_seconds(cell) for cell in texts]
+    time = np.array([np.nan if one is None else one for one in found], dtype=np.float64) + _as_hundredths(texts)
     dated = np.flatnonzero(np.abs(time) > DATED)
     bare = np.flatnonzero((time >= 0.0) & (time <= DAY))
     if not dated.size or not bare.size:
@@ -121,6 +128,18 @@ def stamp_seconds(cells: Iterable[str]) -> tuple[FloatArray, IntArray]:
     beside = time[dated[np.maximum(np.searchsorted(dated, bare) - 1, 0)]]
     time[bare] += DAY * np.round((beside - time[bare]) / DAY)
     return time, bare
+
+
+def _as_hundredths(texts: Sequence[str]) -> FloatArray:
+    """Return what cells (n,) have more, s, where they hold hundredths and were read as milliseconds."""
+    none = np.zeros(len(texts))
+    if not texts or _THIRD.search(texts[0]) is None:
+        return none
+    behind = ["" if (match := _THIRD.search(text)) is None else match[1] for text in texts]
+    two = all(len(digits) in (0, 2) for digits in behind)
+    if not two or max(behind) < _NO_FRAMES or not any(digits.startswith("0") for digits in behind):
+        return none
+    return np.array([0.009 * int(digits or 0) for digits in behind])
 
 
 def is_stamp(cell: str) -> bool:

@@ -192,3 +192,16 @@ def test_gaps_of_a_sensor_that_is_as_fast_as_the_log_stay_gaps(tmp_path):
     mag = import_log(tmp_path / "log.csv").recordings[0].samples["magnetometer"]
     assert len(mag) == LOG.t.size
     assert mag.gaps > 1900
+
+
+def test_u_blox_s_time_of_the_week_is_in_ms_and_stands_before_its_seconds(tmp_path):
+    """The whole seconds beside it were the time, and four fixes of five were left out."""
+    lines = ["iTOW,hour,min,sec,lon,lat,hMSL"]
+    for k in range(60):
+        lines.append(
+            f"{300000000 + 200 * k},14,3,{k // 5},{85000000 + 200 * k},{474000000 + 100 * k},{430000 + 10 * k}"
+        )
+    raw = tmp_path / "pvt.csv"
+    raw.write_text("\n".join([*lines, ""]))
+    gps = import_log(raw).recordings[0].samples["gps"]
+    assert_allclose(gps.t, 0.2 * np.arange(60), atol=1e-6)

@@ -174,6 +174,21 @@ def test_several_samples_of_a_message_are_a_row_each(tmp_path, whole):
     assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-4)
 
 
+def test_messages_of_one_sensor_each_keep_their_own_rows(tmp_path):
+    """As Movesense sends them where each sensor was asked for by itself: both have the same stamps."""
+    messages = []
+    for k in range(0, len(ROWS), 4):
+        for place, name in ((1, "ArrayGyro"), (2, "ArrayAcc")):
+            samples = [dict(zip("xyz", row[place], strict=True)) for row in ROWS[k : k + 4]]
+            messages.append({"Body": {"Timestamp": ROWS[k][0], name: samples}})
+    raw = tmp_path / "log.json"
+    raw.write_text(lines(messages))
+    samples = import_log(raw).recordings[0].samples
+    for sensor, truth, tolerance in (("gyroscope", LOG.gyro, 1e-4), ("accelerometer", LOG.accel, 1e-3)):
+        assert_allclose(samples[sensor].value, truth, atol=tolerance)
+        assert_allclose(samples[sensor].t, LOG.t, atol=1e-4)
+
+
 def test_lists_may_have_names_in_the_first_and_break_off(tmp_path):
     whole = json.dumps([[*COLUMNS], *LISTS])
     raw = tmp_path / "log.json"

@@ -45,6 +45,25 @@ def test_the_stamps_of_the_serial_monitor_are_the_time(tmp_path):
     assert_allclose(import_log(raw).recordings[0].samples["gyroscope"].t, LOG.t, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("first", "cells"),
+    [
+        ("{:.0f}: ", "ax={3} ay={4} az={5} gx={0} gy={1} gz={2}"),
+        ("{:.0f} ms, ", "Acc: {3} {4} {5}, Gyro: {0} {1} {2}"),
+        ("[{:.0f}] ", "A[{3},{4},{5}] G[{0},{1},{2}]"),
+    ],
+)
+def test_a_number_before_the_first_name_is_the_time(tmp_path, first, cells):
+    """It made such lines no rows, or lost the accelerometer and the time."""
+    lines = [first.format(row[0]) + cells.format(*(f"{cell:.4f}" for cell in row[1:])) for row in CELLS]
+    raw = tmp_path / "serial.txt"
+    raw.write_text("\n".join([*lines, ""]))
+    samples = import_log(raw).recordings[0].samples
+    assert_allclose(samples["gyroscope"].t, LOG.t, atol=1e-6)
+    assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-5)
+    assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-3)
+
+
 @pytest.mark.parametrize(("begin", "end"), [("", ""), ("\x1b[0;32m", "\x1b[0m")])
 @pytest.mark.parametrize("names", [True, False])
 def test_what_esp_idf_s_log_puts_before_a_line_is_the_time(tmp_path, begin, end, names):

@@ -40,6 +40,6 @@ def test_two_numbers_in_a_cell_are_a_fix(tmp_path, form):
     assert_allclose(found.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-5)
 
 
-@pytest.mark.parametrize("cell", ["147.4 8.5", "47 8", "47.4", "0.1 0.2 0.3", ""])
+@pytest.mark.parametrize("cell", ["147.40001 8.50001", "47 8", "47.40001", "1.250 3.500", "0.1 0.2 0.3", ""])
 def test_other_cells_are_left_as_they_are(tmp_path, cell):
     assert not begins(table(tmp_path / "log.csv", [cell] * LOG.t.size))

@@ -194,3 +194,14 @@ def test_positions_beside_sensors_stay_what_a_program_worked_out(tmp_path):
     text = "t,gx (deg/s),gy (deg/s),gz (deg/s),x (m),y (m),z (m)\n" + rows(np.column_stack([T, turning, XYZ]))
     (tmp_path / "log.csv").write_text(text)
     assert set(import_log(tmp_path / "log.csv").recordings[0].samples) == {"gyroscope"}
+
+
+def test_kinovea_s_times_of_hundredths_are_no_milliseconds(tmp_path):
+    """`0:00:01:05` was 1.005 s, and the throw ten times as fast as it was."""
+    every = 6
+    stamps = [f"0:00:{int(t):02d}:{round(100 * (t % 1)):02d}" for t in T[::every]]
+    lines = [f"{stamp} {x:.4f} {z:.4f}" for stamp, (x, _, z) in zip(stamps, XYZ[::every], strict=True)]
+    raw = tmp_path / "kinovea.txt"
+    raw.write_text("\n".join(["#Kinovea Trajectory data export", "#T X Y", *lines, ""]))
+    track = import_log(raw).recordings[0].samples["track"]
+    assert_allclose(track.t, T[::every], atol=0.0051)

@@ -104,8 +104,10 @@ def clocks_of(numbers: Numbers) -> list[Clock]:
     if not found:
         steps = [clock for k in range(len(numbers.names)) if (clock := _added_up(numbers, k)) is not None]
         found += [(0, k, clock) for k, clock in enumerate(steps)]
-    if len(found) > 1:  # of columns that are as sure the one that tells more rows apart
-        found = [(rank + 0.5 * _repeats(clock, numbers), k, clock) for rank, k, clock in found]
+    if (
+        len(found) > 1
+    ):  # of columns that are about as sure the one that tells more rows apart: u-blox's iTOW, not its sec
+        found = [(rank + 1.25 * _repeats(clock, numbers), k, clock) for rank, k, clock in found]
     return [clock for *_, clock in sorted(found, key=lambda item: item[:2])] + [_without(numbers)]
 
 
@@ -378,6 +380,8 @@ def _counts_rows(steps: FloatArray) -> bool:
 def written_unit(name: str) -> str | None:
     """Return the unit that a column's name states, or None."""
     rest, unit = split_unit(name.strip())
+    if rest == "iTOW":  # u-blox's time of the week (UBX-13003221, "NAV-PVT")
+        return "ms"
     for spelling in (unit, rest if not unit else ""):
         meant = readings_of(spelling)
         if meant and meant[0].sensor == "time":

@@ -50,6 +50,7 @@ _ROWS = 16
 #: What stands in a line before its record is no longer, begins with a number where that is its time, and is told in
 #: this share of records: some lines break off.
 _LONGEST, _TOLD = 120, 0.9
+_LEVELS = ("DEBUG", "INFO", "WARN", "WARNING", "ERROR")
 _COUNTED = re.compile(r"\s*[\[(]?(\d+(?:\.\d+)?)\s*([mun]?s)?[\])]?(?:\s*(?:[,;:|>=]|->?)|\s+|$)")
 #: Names of three numbers in a list.
 _AXES = "xyz"
@@ -167,11 +168,11 @@ def _stamp_before(prefix: str) -> tuple[str, str] | None:
         return None
     if (begun := stamped(prefix)) is not None:
         return begun[0], begun[1]
-    words = prefix.split()
+    words = [word for word in prefix.split() if word.strip("[]:") not in _LEVELS]  # which could pass for a zone
     for count in (4, 3, 2, 1):
         text = " ".join(words[:count]).strip("[]()<>,;:|- ")
         if len(words) >= count and is_stamp(text):
-            return "time", text.replace(",", ".")
+            return "time", re.sub(r"(?<=\d),(?=\d{1,9}$)", ".", text)
     counted = _COUNTED.match(prefix)
     return None if counted is None else (f"time_{counted[2]}" if counted[2] else "time", counted[1])
 
@@ -197,9 +198,8 @@ def _printed(line: str) -> Any:
 
 def _tables(objects: Sequence[_Record]) -> dict[str, list[_Record]]:
     """Return records by the name of the list that they stand in; those of no list have none."""
-    batches = [list(_batch(one)) for one in objects]
-    if sum(map(len, batches)) >= FEWEST:
-        return {"": [row for rows in batches for batch in rows for row in batch]}
+    if sensors := _sensors_of_messages(objects):
+        return sensors
     inner: dict[str, list[_Record]] = {}
     for one in objects:
         for name, rows in _lists(one):
@@ -209,6 +209,16 @@ def _tables(objects: Sequence[_Record]) -> dict[str, list[_Record]]:
     if len(objects) == 1 and (columns := _columns(objects[0])):
         return columns
     return {"": list(objects)}
+
+
+def _sensors_of_messages(objects: Sequence[_Record]) -> dict[str, list[_Record]]:
+    """Return the samples of messages that have several each, by what their lists are called; empty for others."""
+    batches = [batch for one in objects for batch in _batch(one)]
+    named: dict[str, list[_Record]] = {}
+    for batch in batches if len(batches) >= FEWEST else ():
+        name = "_".join(key for key, part in batch[0].items() if isinstance(part, Mapping))
+        named.setdefault(name, []).extend(batch)
+    return named
 
 
 def _batch(value: Any) -> Iterator[list[_Record]]:

@@ -24,8 +24,8 @@ __all__ = ["begins", "write_tables"]
 
 #: Words for a place in the name of a column.
 _PLACE = {*("gps", "gnss", "location", "position", "coordinates", "coordinate", "coords", "coord"), "latlon", "latlng"}
-#: Two decimal numbers, degrees north and east.
-_PAIR = re.compile(r"\s*[(\[]?\s*([-+]?\d{1,3}\.\d+)(?:\s*[,;]\s*|\s+)([-+]?\d{1,3}\.\d+)\s*[)\]]?\s*")
+#: Degrees north and east, with four decimals at least: fewer are no fix to ten metres, but a place in a room.
+_PAIR = re.compile(r"\s*[(\[]?\s*([-+]?\d{1,3}\.\d{4,})(?:\s*[,;]\s*|\s+)([-+]?\d{1,3}\.\d{4,})\s*[)\]]?\s*")
 #: The fewest rows below the names with such a cell, and how many are looked at: a receiver's first fix takes a minute.
 _FEWEST, _MOST = 3, 2000
 
