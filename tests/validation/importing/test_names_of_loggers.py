@@ -301,18 +301,6 @@ def test_betaflight_s_rates_are_whole_deg_s_beside_counts_of_the_accelerometer(t
     assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=0.51 * DEG)
 
 
-@pytest.mark.parametrize(("per_deg_s", "unit"), [(1.0, "deg/s"), (16.384, "1/16.384 deg/s a count")])
-def test_whole_numbers_that_rest_at_0_beside_counts_are_deg_s(tmp_path, per_deg_s, unit):
-    """The noise of a count shows at rest, that of a whole deg/s does not."""
-    rates = np.round(LOG.gyro / DEG * per_deg_s).astype(int)
-    counts = np.round(2048 * LOG.accel / G0).astype(int)
-    columns = [("time_us", np.round(1e6 * LOG.t).astype(int)), *three(["gx", "gy", "gz"], rates)]
-    log = import_log(write_table(tmp_path / "log.csv", columns + three(["ax", "ay", "az"], counts)))
-    (told,) = [decision for decision in log.decisions if decision.what == "gyroscope unit"]
-    assert told.choice == unit
-    assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=0.51 * DEG / per_deg_s)
-
-
 def test_movesense_s_files_are_its_sensors_by_their_names(tmp_path):
     """The angular velocity was one worked out, and the acceleration, which it calls linear, one without gravity."""
     folder = tmp_path / "session"

@@ -350,25 +350,10 @@ def gyroscope_unit(
             return Unit("mdeg/s", 1.0, _said(name, "mdeg/s", "likely", why))
     if (_whole(value) and (peak > 5000 or stated is not None)) or peak * _RAD > LARGEST_RAD_S:
         return _gyroscope_counts(turned, by, "whole numbers" if _whole(value) else "beyond any gyroscope in deg/s")
-    if _whole(value) and counts_per_g(beside) is not None and _hides_its_noise(value):
-        why = f"whole numbers that stand at 0 at rest, where the noise of counts would show; up to {peak:.4g}"
-        return Unit("deg/s", 1.0, _said(name, "deg/s", "likely", why))
     if _whole(value) and (per_g := counts_per_g(beside)) is not None:
         told = f"whole numbers beside {per_g:.0f} counts per g"
         return _gyroscope_counts(turned, by, told, at_first=per_g == AT_FIRST[0])
     return _by_size(value, peak, beside)
-
-
-def _hides_its_noise(value: FloatArray) -> bool:
-    """Tell whole numbers (n, 3) that are -1, 0 or 1 on all axes in the quietest twentieth of windows of 16 rows.
-
-    Noise of 0.05 to 0.3 deg/s is 0.8 counts and more of the coarsest usual range, and scatters over five at least.
-    """
-    count = len(value) // 16
-    if count <= FEW:
-        return False
-    largest = np.abs(value[: count * 16]).reshape(count, 48).max(axis=1)
-    return bool(np.mean(largest <= 1.0) >= 0.05)
 
 
 def _gyroscope_counts(turned: float | None, by: str, told: str, *, at_first: bool = False) -> Unit:
