@@ -14,7 +14,7 @@ from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.compiled import compiled_nogil
 from discsim.errors import InputError, require_type
 from discsim.estimators.fft_fast import dirichlet, highest, spectra, transform_at
-from discsim.estimators.precession import AxialField, axial_field
+from discsim.estimators.precession import AxialField, axial_field, tipping
 from discsim.estimators.rate import YawRate
 from discsim.estimators.readings import require_readings
 from discsim.estimators.spin_spline import IndexArray
@@ -68,6 +68,7 @@ class FftSettings:
     precession_sd : float
         Rate, along the field, of the turning of a disc's axis in flight, rad/s rms. Of 42 throws of three discs, drawn
         at random (15 to 27 m/s, 2800 to 6400 deg/s, any heading), it is 0.077 rad/s rms, along and across the field.
+        At spins below 4600 deg/s more is taken (`precession.tipping`); this is the least.
     """
 
     window: int = 128
@@ -157,7 +158,7 @@ def fft(
     if not fixed_axis:
         some = slice(None, None, max(1, round(n / 25 / settings.step), starts.size // AXIAL_WINDOWS))
         iron = axial_field(amplitude[some], axial[some], strength)  # windows as far apart as those of `likelihood`
-        precession = _precession(amplitude, axial, iron, strength) * settings.precession_sd
+        precession = _precession(amplitude, axial, iron, strength) * tipping(settings.precession_sd, rate)
     when = centre if settings.stamp == "centre" else t[starts + n - 1]
     return YawRate("fft", when, rate, np.hypot(sd, precession), precession_sd=precession)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.errors import InputError
-from discsim.estimators.precession import AxialField, axial_field, transverse_gyroscope, transverse_rates
+from discsim.estimators.precession import AxialField, axial_field, tipping, transverse_gyroscope, transverse_rates
 from discsim.estimators.rate import YawRate
 from discsim.estimators.spin_spline import IndexArray
 from discsim.estimators.window_fit import COLUMNS, search_windows, turn_windows
@@ -76,7 +76,8 @@ class LikelihoodSettings:
     ellipse_sd : float
         Prior standard deviation of each part of the relative ellipse of soft iron.
     precession_sd : float
-        Transverse rate expected in flight where no gyroscope shows it, rad/s.
+        Transverse rate expected in flight where no gyroscope shows it, rad/s; more at a slow spin
+        (`precession.tipping`).
     significance : float
         Least amplitude over its standard deviation; below it the answer is NaN.
     largest_sd : float
@@ -184,7 +185,8 @@ def likelihood_from_samples(
                 walk = (1.2 if settings.degree < 2 else 2.5) * density * cotangent**2 / fits.length
                 slack = np.sqrt(slack**2 + walk)
         else:
-            slack = np.hypot(fits.axial - axial.offset, axial.sd) / fits.amplitude * settings.precession_sd
+            unseen = tipping(settings.precession_sd, fits.phase_rate)
+            slack = np.hypot(fits.axial - axial.offset, axial.sd) / fits.amplitude * unseen
         rate, sd = -fits.phase_rate, np.hypot(fits.phase_rate_sd, slack)
     moving = np.nan_to_num(fits.correlation, nan=1.0) > LARGEST_CORRELATION
     sd = np.where(moving, np.hypot(sd, fits.wobble), sd)

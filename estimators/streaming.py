@@ -17,7 +17,7 @@ import numpy as np
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.errors import InputError
 from discsim.estimators.likelihood import LikelihoodSettings, fit_windows
-from discsim.estimators.precession import STRENGTH_SD
+from discsim.estimators.precession import STRENGTH_SD, tipping
 from discsim.estimators.tone import field_shape, fit_tone
 
 __all__ = ["Answer", "StreamingRate"]
@@ -181,7 +181,7 @@ class StreamingRate:
                 known_to = STRENGTH_SD * (self.strength or 0.0) ** 2 / max(across, 1.0) if self.strength else 20.0
                 slack = abs(along) / amplitude * known_to
             else:
-                slack = across / amplitude * s.precession_sd
+                slack = across / amplitude * float(tipping(s.precession_sd, rate))
         # slope of the phase's polynomial at its end, x = 1
         weights = np.zeros(parameters.size)
         weights[:powers] = np.arange(powers)

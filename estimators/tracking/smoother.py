@@ -24,8 +24,9 @@ def track_bound(segment: Segment, rate: FloatArray, noise: float, at: float) -> 
     The inverse Fisher matrix for a rate that changes steadily (r'' = 0) with field, hard and soft iron, and the
     gyroscope's bias and gain unknown within their priors. The segment's readings and ``rate`` (n,) are true ones.
     """
-    problem = Problem(segment, top_rate=float(np.max(np.abs(rate))))
-    ones, precession = np.ones(segment.t.size), segment.settings.precession
+    size = np.abs(rate)
+    problem = Problem(segment, top_rate=float(np.max(size)), typical_rate=float(np.median(size)))
+    ones, precession = np.ones(segment.t.size), problem.precession
     start = Point(problem, _start(problem, rate, None), ones)
     point, linear, _ = solve(problem, start, noise, 1e-6, precession, 20)
     information, _, _ = with_roughness(problem, linear, point.x, np.zeros(problem.spline.size - 2), 1e-10)
@@ -77,7 +78,7 @@ def _fitted(problem: Problem, x: FloatArray, floor: float, near: Track | None = 
 
     It ends where a round hardly changes the roughness; the first, which begins anywhere, tells that of a near track.
     """
-    settings, precession = problem.settings, problem.settings.precession
+    expected = precession = problem.precession
     roughness, point = 100.0, Point(problem, x, np.ones(problem.t.size) if near is None else near.weights)
     sigma = max(float(np.sqrt(np.mean(point.at.residual**2))), floor)
     if near is not None:
@@ -96,8 +97,8 @@ def _fitted(problem: Problem, x: FloatArray, floor: float, near: Track | None = 
             PQ = point.x[problem.parts[1]]
             shown = 1 - np.diag(np.linalg.inv(linear.information))[problem.parts[1]] / precession**2
             weight = np.clip(shown, 0, 1)
-            seen = float(np.sum(weight * PQ**2) + 2 * settings.precession**2) / (float(np.sum(weight)) + 2)
-            precession = max(settings.precession, float(np.sqrt(seen)))
+            seen = float(np.sum(weight * PQ**2) + 2 * expected**2) / (float(np.sum(weight)) + 2)
+            precession = max(expected, float(np.sqrt(seen)))
         if (outer > 0 or near is not None) and abs(np.log(roughness / previous)) < 0.2:
             break
     return _Fit(point, linear, target, sigma, mixture)
@@ -195,7 +196,7 @@ def _noise(point: Point, linear: Linear, roughness: float) -> float:
     information = linear.information.copy()
     information[problem.parts[0], problem.parts[0]] += penalty
     # parameters that the data and not the prior decide
-    precision, _ = problem.prior(problem.settings.precession)
+    precision, _ = problem.prior(problem.precession)
     precision[problem.parts[0], problem.parts[0]] += penalty
     freedom = problem.size - float(np.trace(np.linalg.solve(information, precision)))
     count = 3 * float(np.sum(point.weights**2))

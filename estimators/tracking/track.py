@@ -33,7 +33,8 @@ class TrackingSettings:
     strength : float
         Relative, of the field's strength.
     precession, precession_knots : float
-        Where no gyroscope shows p and q: transverse rate in the frame that does not spin, rad/s, and its knots, s.
+        Where no gyroscope shows p and q: transverse rate in the frame that does not spin, rad/s (more at a slow spin,
+        `precession.tipping`), and its knots, s.
     largest_sd : float
         Answers less certain than this, rad/s, are NaN.
     misfit : float
