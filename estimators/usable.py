@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from discsim.arrays import FloatArray
 from discsim.clipping import clipping_notes, constant_axes, dead_axes
 from discsim.errors import InputError, require_type
+from discsim.estimators.ceiling import ceiling
 from discsim.glitches import FASTEST_SPIN, glitches
 from discsim.recording import Recording, Samples
 
@@ -99,6 +100,13 @@ def usable(recording: Recording) -> Usable:
         raise InputError(f"{recording.path or recording.name}: no sensor that shows a spin ({why}){path}")
     changed = gone or any(kept[sensor] is not recording.samples[sensor] for sensor in kept)
     left = replace(recording, samples=kept) if changed else recording
+    if (limit := ceiling(left)) is not None:
+        sheet = replace(left.sheets["gyroscope"], range=limit.least)
+        left = replace(left, sheets={**left.sheets, "gyroscope": sheet})
+        notes.append(
+            f"gyroscope z: its readings scatter about {np.degrees(limit.level):.0f} deg/s and do not change: its limit "
+            f"with noise or a filter behind it, for it is {limit.why}"
+        )
     return Usable(left, gone, notes + clipping_notes(left))
 
 
