@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.errors import InputError, require_type
 from discsim.estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from discsim.estimators.fft import FftSettings, fft
@@ -28,7 +28,7 @@ from discsim.estimators.likelihood import likelihood
 from discsim.estimators.rate import YawRate
 from discsim.estimators.tracking import tracking
 from discsim.estimators.usable import FASTEST, Usable, unclipped, usable
-from discsim.recording import Recording
+from discsim.recording import Recording, Samples
 from discsim.threads import one_thread
 
 __all__ = [
@@ -356,9 +356,22 @@ def _why_unknown(recording: Recording, name: str, options: Options) -> str:
         magnetometer = recording.need("magnetometer")
         if np.all(_tumbling(recording, magnetometer.t, options.fft.window * magnetometer.interval)):
             return "the gyroscope shows no steady spin about z, which a line in the field's spectrum takes for granted"
+        if (longest := _longest_whole(magnetometer)) < options.fft.window:
+            return (
+                f"no window of {options.fft.window} samples is without gaps: readings or rows are missing, and at most "
+                f"{longest} come on end; --window takes fewer, and tracking and likelihood go across gaps"
+            )
         lowest = f"{np.degrees(options.fft.threshold):.0f} deg/s"
         return f"no window of {options.fft.window} samples shows a line above {lowest}; --threshold looks lower"
     return "no part of the recording shows a spin to it"
+
+
+def _longest_whole(magnetometer: Samples) -> int:
+    """Return how many readings of x and y come on end, none missing nor more than half a sample off its time."""
+    known = np.asarray(np.isfinite(magnetometer.value[:, :2]).all(axis=1))
+    even = np.abs(np.diff(magnetometer.t) - magnetometer.interval) <= magnetometer.interval / 2
+    steps = runs(known[1:] & known[:-1] & even)
+    return 1 + max((after - first for first, after in steps), default=0)
 
 
 def missing_sensors(recording: Recording, name: str) -> tuple[str, ...]:

@@ -228,3 +228,16 @@ def test_a_spacing_known_roughly_is_named_from_where_the_gyroscope_shows_that_it
     assert re.search(r"the gyroscope turns 1\.03\d times as fast as the field, always \(within 0\.00\d\)", note)
     assert re.search(r"rows of (4\.9\d*|5(\.0\d*)?) ms, where they were taken as 5\.15 ms", note)
     assert clock_notes(as_if_rows_were(whole, 1.03, 0.0)) == []
+
+
+def test_fft_says_that_gaps_leave_it_no_window():
+    """Every fiftieth reading lost at 100 Hz: it was said that --threshold looks lower, for a spin of 2000 deg/s."""
+    whole = spinning(2000.0, ("magnetometer",))
+    field = whole.samples["magnetometer"]
+    kept = np.arange(len(field)) % 50 != 0
+    value = field.value + np.random.default_rng(2).normal(0.0, 0.6, field.value.shape)
+    gappy = replace(whole, samples={"magnetometer": Samples(field.t[kept], value[kept])})
+    _, left_out = all_methods(gappy)
+    assert "no window of 128 samples is without gaps" in left_out["fft"]
+    assert "at most 49 come on end" in left_out["fft"]
+    assert "--threshold" not in left_out["fft"]

@@ -10,6 +10,7 @@ import typer
 from discsim.validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
+    from discsim.estimators.rate import YawRate
     from discsim.recording import Recording
     from discsim.validation.estimating.spin_estimates import SpinEstimates
 
@@ -88,6 +89,14 @@ def _called(recording: Recording) -> str:
     return recording.name if recording.path is None else recording.path.name
 
 
+def _times(rate: YawRate) -> str:
+    """Return from when to when a method knows the rate: medians over other times are of other spins."""
+    import numpy as np
+
+    known = rate.t[np.isfinite(rate.rate)]
+    return f"{round(known[0], 1) + 0.0:.1f} to {known[-1]:.1f}" if known.size else ""
+
+
 def _print(found: SpinEstimates) -> None:
     import numpy as np
     from rich.console import Console
@@ -97,8 +106,10 @@ def _print(found: SpinEstimates) -> None:
 
     # names are what --method takes: whole on a narrow terminal, too
     first = Column("method", no_wrap=True, min_width=max((len(rate.method) for rate in found.rates), default=0))
-    table = Table(first, "values", "unknown", "median, deg/s", "median sd, deg/s")
-    for rate in found.rates:
+    spans = [_times(rate) for rate in found.rates]
+    covers = Column("times, s", no_wrap=True, min_width=max(map(len, spans), default=0))
+    table = Table(first, "values", "unknown", covers, "median, deg/s", "median sd, deg/s")
+    for rate, span in zip(found.rates, spans, strict=True):
         figures = figures_of(rate)
         cells = [np.degrees(figures["median_rate_rad_s"]), np.degrees(figures["median_sd_rad_s"])]
         # a deviation that rounds to nothing is not nothing
@@ -108,7 +119,7 @@ def _print(found: SpinEstimates) -> None:
         ]
         if figures.get("median_is_beyond"):
             shown = [f"beyond {shown[0]}", ""]
-        table.add_row(rate.method, str(len(rate)), f"{100 * figures['share_unknown']:.0f} %", *shown)
+        table.add_row(rate.method, str(len(rate)), f"{100 * figures['share_unknown']:.0f} %", span, *shown)
     Console().print(table)
     for line in found.remarks:
         typer.echo(line)

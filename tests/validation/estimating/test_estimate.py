@@ -214,3 +214,14 @@ def test_of_a_data_set_each_recording_is_estimated_into_a_folder_of_its_own(fold
     shown = capsys.readouterr()
     assert "recording 2 of 2: 02" in shown.err
     assert "02:" in shown.out
+
+
+def test_all_prints_the_times_that_each_median_is_of(folder, tmp_path, capsys):
+    """A window's centre is never within half of it of an end: the median is of other times than a gyroscope's."""
+    command(folder, method="all", out=tmp_path / "out")
+    lines = capsys.readouterr().out.splitlines()
+    rates = estimate_spin(read_recording(folder), "all")
+    for rate in rates.rates:
+        row = next(line for line in lines if line.startswith(f"│ {rate.method} "))
+        known = rate.t[np.isfinite(rate.rate)]
+        assert f"{abs(round(known[0], 1)):.1f} to {known[-1]:.1f}" in row

@@ -29,7 +29,7 @@ from discsim.validation.diagnosis.setup.hypotheses import (
 )
 from discsim.validation.diagnosis.setup.late_sensor import SHORTEST, LateSensor, late_sensor
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
-from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
+from discsim.validation.diagnosis.setup.reference import believed, field_is_folded, reference_doubts
 from discsim.validation.diagnosis.setup.remedy import MapAxes, place_instead, remedy
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
 from discsim.validation.diagnosis.setup.units import clock_doubts, clock_unit, sensor_units
@@ -327,11 +327,12 @@ def _angle(one: FloatArray | None, other: FloatArray | None) -> float:
 def _judgeable(recording: Recording) -> Recording:
     """Return the part of a recording that is judged: where it turns most, if it is long.
 
-    Without its magnetometer where the field is not stated: nothing tells what it should read. Without a sensor of the
+    Without its magnetometer where the field is not stated: nothing tells what it should read; nor where the reference
+    turns too fast for its readings: a field that is folded seems to go the other way round. Without a sensor of the
     board of which an axis was never read, or every reading is the same: what is dead agrees with any order of axes.
     """
     kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
-    if not recording.environment.field_known:
+    if not recording.environment.field_known or field_is_folded(recording):
         kept.pop("magnetometer", None)
     busiest = _busiest(kept, plant_of(recording).durations.setup)
     if busiest is not None:

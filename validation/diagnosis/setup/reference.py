@@ -20,7 +20,7 @@ from discsim.validation.diagnosis.setup.shown_rates import FEWEST_SLOTS, ShownRa
 from discsim.validation.diagnosis.setup.units import NEAR
 from discsim.validation.identification.plants import plant_of
 
-__all__ = ["ReferenceDoubt", "believed", "reference_doubts"]
+__all__ = ["ReferenceDoubt", "believed", "field_is_folded", "reference_doubts"]
 
 #: files of rates
 _REFERENCE, _COMMAND = "rate_reference.csv", "command.csv"
@@ -57,6 +57,9 @@ _OWN_CAUSES: Mapping[str, str] = MappingProxyType(
         "rate_reference": "the rate reference",
     }
 )
+#: a field is folded where it shows the rate told less one or two turns per reading, within this share of a turn: its
+#: noise leaves a hundredth, and a rate of another unit comes so near by chance once in 25 times
+_FOLDED, _MOST_TURNS = 0.01, 2
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,8 @@ def reference_doubts(recording: Recording) -> Iterator[ReferenceDoubt]:
     if not known:
         return
     shown = shown_rates(recording)
+    if any(_folded(recording, shown, one) for one in known.values()):
+        shown = {name: one for name, one in shown.items() if name != "magnetometer"}
     still = {file: one for file, one in known.items() if not np.any(one.value)}
     reference, command = (None if file in still else known.get(file) for file in (_REFERENCE, _COMMAND))
     if reference is not None:
@@ -113,6 +118,34 @@ def reference_doubts(recording: Recording) -> Iterator[ReferenceDoubt]:
     doubt = _command_clock(recording, shown, command) or _of_rates(_COMMAND, recording, shown, command)
     if doubt is not None:
         yield doubt
+
+
+def field_is_folded(recording: Recording) -> bool:
+    """Tell whether a reference turns faster than half the magnetometer's sampling rate, and the field so folded."""
+    field, reference = recording.get("magnetometer"), _known(recording.get("rate_reference"))
+    if field is None or reference is None or len(field) < 2:
+        return False
+    if not np.max(np.abs(reference.value)) > np.pi / field.interval:
+        return False
+    return _folded(recording, shown_rates(recording), reference)
+
+
+def _folded(recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> bool:
+    """Tell whether the field shows the rate told less whole turns per reading, wherever that is beyond half of one."""
+    if (one := shown.get("magnetometer")) is None:
+        return False
+    read, said = one.beside(told)
+    turn = 2.0 * np.pi / recording.need("magnetometer").interval
+    beyond = np.abs(said) > 0.5 * turn
+    if np.count_nonzero(beyond) < FEWEST_SLOTS:
+        return False
+    read, said = read[beyond], said[beyond]
+    for sign in (1.0, -1.0):  # the axes may be mirrored as well
+        turns = np.rint((said - sign * read) / turn)
+        off = np.abs(said - sign * read - turns * turn)
+        if np.all(np.abs(turns) <= _MOST_TURNS) and np.median(off) < _FOLDED * turn:
+            return True
+    return False
 
 
 def believed(recording: Recording, doubts: Iterable[ReferenceDoubt]) -> Recording:
