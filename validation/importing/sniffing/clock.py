@@ -104,9 +104,8 @@ def clocks_of(numbers: Numbers) -> list[Clock]:
     if not found:
         steps = [clock for k in range(len(numbers.names)) if (clock := _added_up(numbers, k)) is not None]
         found += [(0, k, clock) for k, clock in enumerate(steps)]
-    if (
-        len(found) > 1
-    ):  # of columns that are about as sure the one that tells more rows apart: u-blox's iTOW, not its sec
+    if len(found) > 1:
+        # of columns that are about as sure the one that tells more rows apart: u-blox's iTOW, not its sec
         found = [(rank + 1.25 * _repeats(clock, numbers), k, clock) for rank, k, clock in found]
     return [clock for *_, clock in sorted(found, key=lambda item: item[:2])] + [_without(numbers)]
 
