@@ -20,6 +20,8 @@ __all__ = ["Ceiling", "ceiling"]
 BLOCK, LEAST_READINGS = 0.1, 8
 #: Fewest blocks on end of a level: a line through six leaves four degrees of freedom for its scatter.
 LEAST_BLOCKS = 6
+#: Largest share of readings at a stated range that scatter about it: half of them are beyond it, and a few more.
+MOST_EQUAL = 0.6
 #: Standard deviations beyond which a block is none of a level, or a slope is shown: 6e-5 of normal ones.
 SURE = 4.0
 #: A free spin slows down by this share of itself a second at least: air gives a disc 1/60 to 1/15.
@@ -65,7 +67,8 @@ def ceiling(recording: Recording) -> Ceiling | None:
     if gyroscope is None or gyroscope.value.ndim != 2 or len(gyroscope) < LEAST_BLOCKS * LEAST_READINGS:
         return None
     sheet = recording.sheets["gyroscope"]
-    if sheet.range is None and np.any(sheet.clipped(gyroscope.value)[:, 2]):
+    clipped = sheet.clipped(gyroscope.value)[:, 2]
+    if np.mean(clipped) > MOST_EQUAL or (sheet.range is None and np.any(clipped)):
         return None  # it shows its limit by equal readings
     found = _plateau(gyroscope.t, np.abs(gyroscope.value[:, 2]), gyroscope.interval)
     why = "" if found is None else _why(recording, found, gyroscope)

@@ -13,6 +13,7 @@ from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.rounded_stamps import evened, unit_of
 from discsim.validation.checking.track_path import holds_height
+from discsim.validation.diagnosis.late_stamps import with_even_rows
 from discsim.validation.diagnosis.repeats import without_held_readings
 from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.throw_ends import coasting_part, free_part
@@ -46,7 +47,7 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
-        for change in (without_held_readings, _free, _downwards, _in_flight, _evened):
+        for change in (without_held_readings, _free, _downwards, _in_flight, _evened, with_even_rows):
             recording, told = change(recording)
             for note in told:
                 notes.setdefault(note, []).append(name)

@@ -23,6 +23,7 @@ from discsim.validation.checking.failed_readings import failed_findings, without
 from discsim.validation.checking.finding import doubts_of
 from discsim.validation.checking.readings import reading_findings
 from discsim.validation.checking.statements import statement_findings
+from discsim.validation.diagnosis.late_stamps import with_even_rows
 from discsim.validation.diagnosis.repeats import without_held_readings
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.reference import ReferenceDoubt, believed, reference_doubts
@@ -126,7 +127,8 @@ def estimate_spin(
 
     Readings that failed (-1, 65535) are left out, setup faults (an axis, a unit, an offset in time) mended, and noted;
     `discsim.estimators.estimate` does without. A rate reference that the sensors beside it refute is passed over, but
-    where it is asked for. What was written again with a faster sensor's rows counts once.
+    where it is asked for. What was written again with a faster sensor's rows counts once, and what was
+    stamped early or late of even rows is taken at these.
     Raises `InputError` for an unknown method, more than one recording, or where nothing can be estimated.
     """
     require_type(method, str, "method", f"the name of one: best, all, {', '.join(METHODS)}")
@@ -135,6 +137,7 @@ def estimate_spin(
         raise InputError(f"{len(given)} recordings; expected one (take them one after the other)")
     failed = doubts_of(failed_findings(given[0]))
     sound, repeats = without_held_readings(without_failed(given[0]))
+    sound, stamps = with_even_rows(sound)
     setup = find_setup_faults([sound])
     data = setup.recordings[0]
     refuted = list(reference_doubts(data))
@@ -145,6 +148,7 @@ def estimate_spin(
     notes = [
         *(f"{one}; the estimates are of the rest" for one in failed),
         *repeats,
+        *stamps,
         *setup_notes(setup, "the estimates are of"),
         *_errors(data, refuted),
         *all_notes(taken),

@@ -21,6 +21,7 @@ from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.apart import apart
 from discsim.validation.importing.cleaning import cleaned, without_glitches
+from discsim.validation.importing.even_rows import at_even_times
 from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, on_all_axes
 from discsim.validation.importing.fixes_once import fixes_once
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
@@ -141,6 +142,9 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
         whole, readings = readings, _cut(read, rows)
         notes += [f"no {sensor} in these rows" for sensor in whole if sensor not in readings]
     repairs = RepairList(import_map.repairs)
+    rows_of = {sensor: (read.tables[sensor].path, import_map.sensors[sensor].time) for sensor in readings}
+    readings, said = at_even_times(readings, rows_of)
+    notes += said
     readings, rates, said = _fresh(raw, readings, import_map, read.tables, repairs)
     notes += said
     lone = [sensor for sensor, found in readings.items() if found.time.size == 1]

@@ -16,7 +16,7 @@ from discsim.validation.importing.held import come_evenly
 from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.timing import row_timing
 
-__all__ = ["OwnTimes", "between_rows", "in_step", "own_times"]
+__all__ = ["LESS", "STRETCH", "OwnTimes", "between_rows", "in_step", "left_by_turning", "own_times"]
 
 #: share of a reading's lateness that moves the phase of its sensor, times the share of rows that repeat
 PHASE_GAIN = 0.1
@@ -92,10 +92,10 @@ def _turns_evenly(found: Readings, time: FloatArray) -> bool:
     """Tell whether a sensor's readings turn as even times (n,) s have it, and not as the times of their rows do."""
     if not np.all(np.diff(time) > 0):
         return False
-    return _left_by_turning(time, found) < LESS * _left_by_turning(found.time, found)
+    return left_by_turning(time, found) < LESS * left_by_turning(found.time, found)
 
 
-def _left_by_turning(time: FloatArray, found: Readings) -> float:
+def left_by_turning(time: FloatArray, found: Readings) -> float:
     """Return the share of a sensor's changes that steady turnings leave, at some times (n,) s of its readings."""
     count = time.size // STRETCH
     t = time[: count * STRETCH].reshape(count, STRETCH)
