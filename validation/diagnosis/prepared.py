@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from discsim.clipping import constant_axes
+from discsim.clipping import constant_axes, step_of
+from discsim.effects.kind import BOARD
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.rounded_stamps import evened, unit_of
@@ -18,6 +19,7 @@ from discsim.validation.diagnosis.repeats import without_held_readings
 from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.throw_ends import coasting_part, free_part
 from discsim.validation.diagnosis.track_ends import flight_of
+from discsim.validation.identification.coarse_steps import stands
 from discsim.validation.identification.initial.smoothing import FEWEST
 from discsim.validation.identification.plants import plant_of
 from discsim.written import require_seconds
@@ -47,7 +49,7 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
-        for change in (without_held_readings, _free, _downwards, _in_flight, _evened, with_even_rows):
+        for change in (without_held_readings, _free, _downwards, _in_flight, _evened, with_even_rows, _on_steps):
             recording, told = change(recording)
             for note in told:
                 notes.setdefault(note, []).append(name)
@@ -127,6 +129,26 @@ def _evened(recording: Recording) -> tuple[Recording, list[str]]:
             samples[sensor] = Samples(t, one.value)
             said.append(_EVENED.format(sensor, 1e3 * unit_of(one.t)))
     return (replace(recording, samples=samples), said) if said else (recording, [])
+
+
+def _on_steps(recording: Recording) -> tuple[Recording, list[str]]:
+    """Return a recording that states the steps on which sensors stand, where these hide their noise, and what is said.
+
+    A log of too few decimals has coarser steps than its sensor.
+    """
+    sheets, said = dict(recording.sheets), []
+    for sensor in [one for one in recording.samples if one in BOARD]:
+        value, sheet = recording.samples[sensor].value, sheets[sensor]
+        step, noise = step_of(value), sheet.noise_rms or 0.0
+        if not stands(value, step, noise):
+            continue
+        sheets[sensor] = replace(sheet, resolution=step)
+        unit = {"rad_s": "rad/s", "m_s2": "m/s^2"}.get(SENSORS[sensor].unit, SENSORS[sensor].unit)
+        said.append(
+            f"the {sensor} stands on steps of {step:.4g} {unit}, {step / noise:.0f} times its noise: "
+            "only where it goes on by a step do its readings count. Expected as many decimals as the noise has."
+        )
+    return (replace(recording, sheets=sheets), said) if said else (recording, [])
 
 
 def _refuse(recording: Recording, name: str) -> None:
@@ -245,6 +267,8 @@ def _notes(recording: Recording, sensor: str, samples: Samples, left: Samples | 
                 f"{column} of the {sensor} stands at its range in {100.0 * share:.0f} % of its readings: they say only "
                 "that the motion was beyond it."
             )
+    if stands(value, sheet.resolution or 0.0, sheet.noise_rms or 0.0):
+        return  # `_on_steps` has said so
     rows = value[finite.all(axis=1)]
     same = np.all(np.diff(rows, axis=0) == 0.0, axis=1) if len(rows) > FEWEST else np.zeros(1)
     if np.mean(same) > _HELD and np.any(np.ptp(rows, axis=0) > 0.0):

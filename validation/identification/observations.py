@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.effects.kind import BOARD
 from discsim.recording import SENSORS, Recording
 from discsim.validation.identification.clipping import clipping_level
+from discsim.validation.identification.coarse_steps import at_steps, stands
 from discsim.validation.identification.plants import plant_of
 from discsim.validation.identification.readings import Readings
 
@@ -36,6 +38,10 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         # times that were corrected may begin before the motion does
         good = np.isfinite(measured) & ~clipped & (samples.t >= 0.0)[:, None]
+        noise, step = sheet.noise_rms or 0.0, sheet.resolution or 0.0
+        if sensor in BOARD and stands(measured, step, noise):
+            measured, there = at_steps(measured, step, noise)
+            good, sd = good & there, np.full(measured.shape[1], noise)
         axes = tuple(SENSORS[sensor].columns)
         taken, weights = recording.averaged.get(sensor, (None, None))
         one = Readings(sensor, samples.t, measured, good, clipped, sd, axes, limit, taken, weights)
