@@ -139,14 +139,14 @@ def _on_steps(recording: Recording) -> tuple[Recording, list[str]]:
     sheets, said = dict(recording.sheets), []
     for sensor in [one for one in recording.samples if one in BOARD]:
         value, sheet = recording.samples[sensor].value, sheets[sensor]
-        step, noise = step_of(value), sheet.noise_rms or 0.0
+        step, noise = step_of(value), sheet.noise_rms
         if not stands(value, step, noise):
             continue
         sheets[sensor] = replace(sheet, resolution=step)
         unit = {"rad_s": "rad/s", "m_s2": "m/s^2"}.get(SENSORS[sensor].unit, SENSORS[sensor].unit)
         said.append(
-            f"the {sensor} stands on steps of {step:.4g} {unit}, {step / noise:.0f} times its noise: "
-            "only where it goes on by a step do its readings count. Expected as many decimals as the noise has."
+            f"the {sensor} stands on steps of {step:.4g} {unit}, {f'{step / noise:.0f}' if noise else 'many'} times "
+            "its noise: only where it goes on by a step do its readings count. Expected decimals that show its noise."
         )
     return (replace(recording, sheets=sheets), said) if said else (recording, [])
 
@@ -267,7 +267,7 @@ def _notes(recording: Recording, sensor: str, samples: Samples, left: Samples | 
                 f"{column} of the {sensor} stands at its range in {100.0 * share:.0f} % of its readings: they say only "
                 "that the motion was beyond it."
             )
-    if stands(value, sheet.resolution or 0.0, sheet.noise_rms or 0.0):
+    if stands(value, sheet.resolution or 0.0, sheet.noise_rms):
         return  # `_on_steps` has said so
     rows = value[finite.all(axis=1)]
     same = np.all(np.diff(rows, axis=0) == 0.0, axis=1) if len(rows) > FEWEST else np.zeros(1)

@@ -22,25 +22,34 @@ COARSE = 3.0
 STANDING = 0.5
 #: fewest rows that stand before and after a step: the step's own instant is known to a row, a third of one of those
 FEWEST = 3
+#: fewest instants that are looked at, as of readings of a sensor at all
+LEAST = 12
 
 
-def stands(value: FloatArray, step: float, noise: float) -> bool:
-    """Tell whether readings (n, k) stand on steps that are coarse beside their noise."""
-    if not step > COARSE * noise > 0.0 or len(value) < 2:
+def stands(value: FloatArray, step: float, noise: float | None) -> bool:
+    """Tell whether readings (n, k) stand on steps that are coarse beside their noise, and go on by some.
+
+    Of a noise that nobody states (None) they tell themselves: on all axes at once only a small one stands so. One that
+    is stated as zero is left alone, and so is what never goes on, as on a table at one rate.
+    """
+    if not (step > 0.0 if noise is None else step > COARSE * noise > 0.0) or len(value) < 2:
         return False
     known = np.all(np.isfinite(value), axis=1)
     both = known[1:] & known[:-1]
     same = np.all(np.abs(np.diff(value, axis=0)) < 0.5 * step, axis=1)
-    return bool(np.count_nonzero(same & both) > STANDING * np.count_nonzero(both))
+    if not np.count_nonzero(same & both) > STANDING * np.count_nonzero(both):
+        return False
+    return np.count_nonzero(at_steps(value, step, noise)[1]) >= LEAST
 
 
-def at_steps(value: FloatArray, step: float, noise: float) -> tuple[FloatArray, BoolArray]:
+def at_steps(value: FloatArray, step: float, noise: float | None) -> tuple[FloatArray, BoolArray]:
     """Return the true values (n, k) where readings (n, k) go on by a step, and which (n, k) these are.
 
     Their errors are the noise at most. Between two stands of an axis there may be rows that toggle between both, as
-    noise makes them: the step is where it would be if those were in order.
+    noise makes them: the step is where it would be if those were in order. Of a noise that nobody states (None) only
+    what it is at most is taken.
     """
-    least = max(FEWEST, int(np.ceil(step / (noise * np.sqrt(12.0)))))
+    least = max(FEWEST, int(np.ceil(step / (noise * np.sqrt(12.0)))) if noise else 0)
     found, good = np.full(value.shape, np.nan), np.zeros(value.shape, dtype=np.bool_)
     for axis, column in enumerate(value.T):
         level = np.where(np.isfinite(column), np.round(column / step), np.nan)

@@ -38,10 +38,9 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         # times that were corrected may begin before the motion does
         good = np.isfinite(measured) & ~clipped & (samples.t >= 0.0)[:, None]
-        noise, step = sheet.noise_rms or 0.0, sheet.resolution or 0.0
-        if sensor in BOARD and stands(measured, step, noise):
-            measured, there = at_steps(measured, step, noise)
-            good, sd = good & there, np.full(measured.shape[1], noise)
+        if sensor in BOARD and stands(measured, sheet.resolution or 0.0, sheet.noise_rms):
+            measured, there = at_steps(measured, sheet.resolution or 0.0, sheet.noise_rms)
+            good, sd = good & there, np.full(measured.shape[1], _or_nan(sheet.noise_rms))
         axes = tuple(SENSORS[sensor].columns)
         taken, weights = recording.averaged.get(sensor, (None, None))
         one = Readings(sensor, samples.t, measured, good, clipped, sd, axes, limit, taken, weights)

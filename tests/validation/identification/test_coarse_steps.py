@@ -45,6 +45,8 @@ def test_what_changes_with_every_row_stands_on_no_steps():
     assert stands(slowing(1)[1][:, None], STEP, NOISE)
     assert not stands(slowing(1)[1][:, None], STEP, 0.05)
     assert not stands(slowing(1)[1][:, None], STEP, 0.0)
+    assert stands(slowing(1)[1][:, None], STEP, None)
+    assert not stands(np.full((1000, 3), 4.0), STEP, NOISE)  # one rate of a table
 
 
 def test_a_leap_over_steps_and_a_gap_tell_nothing():
