@@ -71,8 +71,9 @@ def ceiling(recording: Recording) -> Ceiling | None:
     if np.mean(clipped) > MOST_EQUAL or (sheet.range is None and np.any(clipped)):
         return None  # it shows its limit by equal readings
     found = _plateau(gyroscope.t, np.abs(gyroscope.value[:, 2]), gyroscope.interval)
-    why = "" if found is None else _why(recording, found, gyroscope)
-    return Ceiling(found.level, found.level - SURE * found.sigma, why) if found is not None and why else None
+    if found is None or not (why := _why(recording, found, gyroscope)):
+        return None
+    return Ceiling(found.level, found.level - SURE * found.sigma, why)
 
 
 def _plateau(t: FloatArray, z: FloatArray, interval: float) -> _Plateau | None:
@@ -123,8 +124,7 @@ def _why(recording: Recording, found: _Plateau, gyroscope: Samples) -> str:
     if not _among(level, (*FULL_SCALES, *LOWER_SCALES)):
         return ""
     others = [other for other in (_by_field(recording, found), _by_pull(recording, found)) if other is not None]
-    if any(more for _, more in others):
-        sensor = next(name for name, more in others if more)
+    if (sensor := next((name for name, more in others if more), None)) is not None:
         return f"a full scale of gyroscopes, and the {sensor} shows more"
     if others or found.falls or recording.plant not in ("flight", "free_spin"):
         return ""

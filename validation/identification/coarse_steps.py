@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray, IntArray
+from discsim.arrays import BoolArray, FloatArray
 
-__all__ = ["COARSE", "at_steps", "stands"]
+__all__ = ["at_steps", "stands", "told_by_steps"]
 
 #: steps of so many noises are coarse: at two a rounded Gaussian's error still changes from row to row (B. Widrow and
 #: I. Kollar, "Quantization Noise", 2008, ch. 11: with a noise of half a step it is white to 1 %)
@@ -27,19 +27,25 @@ LEAST = 12
 
 
 def stands(value: FloatArray, step: float, noise: float | None) -> bool:
-    """Tell whether readings (n, k) stand on steps that are coarse beside their noise, and go on by some.
+    """Tell whether readings (n, k) stand on steps that are coarse beside their noise, and go on by some."""
+    return told_by_steps(value, step, noise) is not None
+
+
+def told_by_steps(value: FloatArray, step: float, noise: float | None) -> tuple[FloatArray, BoolArray] | None:
+    """Return what `at_steps` does of readings (n, k) that stand on steps coarse beside their noise; None of others.
 
     Of a noise that nobody states (None) they tell themselves: on all axes at once only a small one stands so. One that
     is stated as zero is left alone, and so is what never goes on, as on a table at one rate.
     """
     if not (step > 0.0 if noise is None else step > COARSE * noise > 0.0) or len(value) < 2:
-        return False
+        return None
     known = np.all(np.isfinite(value), axis=1)
     both = known[1:] & known[:-1]
     same = np.all(np.abs(np.diff(value, axis=0)) < 0.5 * step, axis=1)
     if not np.count_nonzero(same & both) > STANDING * np.count_nonzero(both):
-        return False
-    return np.count_nonzero(at_steps(value, step, noise)[1]) >= LEAST
+        return None
+    found, good = at_steps(value, step, noise)
+    return (found, good) if np.count_nonzero(good) >= LEAST else None
 
 
 def at_steps(value: FloatArray, step: float, noise: float | None) -> tuple[FloatArray, BoolArray]:
@@ -69,7 +75,7 @@ def at_steps(value: FloatArray, step: float, noise: float | None) -> tuple[Float
     return found, good
 
 
-def _of_step(level: FloatArray | IntArray, left: int, came: int) -> int | None:
+def _of_step(level: FloatArray, left: int, came: int) -> int | None:
     """Return the first row behind a step by one between two stands, which end before ``left`` and begin at ``came``."""
     before, behind = level[left - 1], level[came]
     between = level[left:came]

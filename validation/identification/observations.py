@@ -8,7 +8,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.effects.kind import BOARD
 from discsim.recording import SENSORS, Recording
 from discsim.validation.identification.clipping import clipping_level
-from discsim.validation.identification.coarse_steps import at_steps, stands
+from discsim.validation.identification.coarse_steps import told_by_steps
 from discsim.validation.identification.plants import plant_of
 from discsim.validation.identification.readings import Readings
 
@@ -38,8 +38,9 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         # times that were corrected may begin before the motion does
         good = np.isfinite(measured) & ~clipped & (samples.t >= 0.0)[:, None]
-        if sensor in BOARD and stands(measured, sheet.resolution or 0.0, sheet.noise_rms):
-            measured, there = at_steps(measured, sheet.resolution or 0.0, sheet.noise_rms)
+        told = told_by_steps(measured, sheet.resolution or 0.0, sheet.noise_rms) if sensor in BOARD else None
+        if told is not None:
+            measured, there = told
             good, sd = good & there, np.full(measured.shape[1], _or_nan(sheet.noise_rms))
         axes = tuple(SENSORS[sensor].columns)
         taken, weights = recording.averaged.get(sensor, (None, None))

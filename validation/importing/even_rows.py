@@ -42,25 +42,22 @@ def at_even_times(
 
     ``tables`` tells which table's rows a sensor stands on. Of a table without a magnetometer nothing is told.
     """
-    found, notes = dict(readings), list[str]()
-    for sensor in [name for name in found if name == "magnetometer"]:
-        beside = [name for name in found if tables[name] == tables[sensor]]
-        number, first = np.unique(np.concatenate([found[name].number for name in beside]), return_index=True)
-        stamps = np.concatenate([found[name].time for name in beside])[first]
-        even = even_times(number, stamps)
-        if even is None:
-            continue
-        if not left_beside_stamps(found[sensor], even[np.searchsorted(number, found[sensor].number)]) < LESS:
-            continue
-        for name in beside:
-            one = found[name]
-            found[name] = one._replace(time=even[np.searchsorted(number, one.number)])
-        off = 1e3 * float(np.sqrt(np.mean((stamps - even) ** 2)))
-        notes.append(
-            f"{', '.join(beside)}: the stamps are {off:.2g} ms (rms) early or late of even rows, and the field turns "
-            "more evenly by those: the rows are taken as even"
-        )
-    return found, notes
+    field = readings.get("magnetometer")
+    if field is None:
+        return dict(readings), []
+    beside = {name: one for name, one in readings.items() if tables[name] == tables["magnetometer"]}
+    number, first = np.unique(np.concatenate([one.number for one in beside.values()]), return_index=True)
+    stamps = np.concatenate([one.time for one in beside.values()])[first]
+    even = even_times(number, stamps)
+    if even is None or not left_beside_stamps(field, even[np.searchsorted(number, field.number)]) < LESS:
+        return dict(readings), []
+    mended = {name: one._replace(time=even[np.searchsorted(number, one.number)]) for name, one in beside.items()}
+    off = 1e3 * float(np.sqrt(np.mean((stamps - even) ** 2)))
+    said = (
+        f"{', '.join(beside)}: the stamps are {off:.2g} ms (rms) early or late of even rows, and the field turns "
+        "more evenly by those: the rows are taken as even"
+    )
+    return {**readings, **mended}, [said]
 
 
 def left_beside_stamps(field: Readings, even: FloatArray) -> float:
@@ -93,13 +90,15 @@ def even_times(number: IntArray, stamps: FloatArray) -> FloatArray | None:
         return None
     steps = np.diff(stamps) - step * np.diff(place)
     late = stamps - step * place
-    for row in np.flatnonzero(steps > max(0.5 * step, SURE * float(sd_by_median(steps)))) + 1:
-        before, after = late[max(row - BEHIND, 0) : row], late[row : row + BEHIND]
+    lost = np.zeros(stamps.size)
+    for row in (np.flatnonzero(steps > max(0.5 * step, SURE * float(sd_by_median(steps)))) + 1).tolist():
+        first = max(row - BEHIND, 0)
+        nearby = slice(first, row + BEHIND)
+        before, after = np.split(late[nearby] - step * np.cumsum(lost[nearby]), [row - first])
         # a stamp that is late by itself moves neither the middle nor the earliest of so many
         behind = min(np.median(after) - np.median(before), np.min(after) - np.min(before))
-        lost = max(round(float(behind) / step), 0)
-        place[row:] += lost
-        late[row:] -= lost * step
+        lost[row] = max(round(float(behind) / step), 0)
+    place += np.cumsum(lost)
     slope, start = _line(place, stamps)
     even = start + slope * place
     off = stamps - even
