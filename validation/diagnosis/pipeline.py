@@ -245,6 +245,11 @@ def _follows(tried: Tried, before: Tried) -> bool:
     return tried.contradiction is None
 
 
+def _follows_as_well(tried: Tried, before: Tried) -> bool:
+    """Tell whether sensors do not contradict one another, and no more than noise is left if nothing more was before."""
+    return tried.contradiction is None and (_explains(tried) or not _explains(before))
+
+
 def _explains(tried: Tried) -> bool:
     """Tell whether a supposition leaves no more than noise."""
     return tried.found is not None and not leaves_more_than_noise(tried.found)
@@ -270,7 +275,8 @@ def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:
     Whether a motion then follows the sensors tells whether it is there.
     """
     del question
-    return None if tried.contradiction is None else with_likeliest_fault(tried.prepared.setup)
+    contradiction = tried.contradiction
+    return None if contradiction is None else with_likeliest_fault(tried.prepared.setup, contradiction.blamed)
 
 
 def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
@@ -317,6 +323,6 @@ _SUPPOSITIONS = (
     (likeliest_fault, _follows),
     (times_as_written, _explains_all),
     (axes_as_written, _explains_with_less),
-    (reversed_axes, _follows),
+    (reversed_axes, _follows_as_well),
     (borne_out, _follows),
 )

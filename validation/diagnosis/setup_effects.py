@@ -15,10 +15,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, effect_of, row
+from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, row
 from discsim.effects.kind import BOARD
-from discsim.effects.sensors import Scale
-from discsim.effects.setup import Axes, BoardRotation, ClockUnit, SiteField, TimeOffset
+from discsim.effects.sensors import Scale, SoftIron
+from discsim.effects.setup import BoardRotation, ClockUnit, SiteField, TimeOffset
 from discsim.recording import Recording
 from discsim.validation.diagnosis.result import (
     SMALLEST_P_VALUE,
@@ -30,8 +30,9 @@ from discsim.validation.diagnosis.result import (
     Verdict,
 )
 from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said, with_fault
+from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said, with_axes_of_signs
 from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.other_side import at_limits
 from discsim.validation.identification.parameters import Parameter
 from discsim.written import corrected
 
@@ -50,6 +51,12 @@ __all__ = [
 _SIGMA: Mapping[type[Any], float] = {TimeOffset: 0.01, BoardRotation: 0.2, SiteField: 0.2}
 #: a number whose error is this share of that was not determined by the recordings
 _UNDETERMINED = 0.3
+#: the numbers of a fit that are -2 where an axis reads -1 times what it should, by sensor
+_AXES_OF: Mapping[str, tuple[tuple[type[Any], str], ...]] = {
+    "accelerometer": tuple((Scale, name) for name in Scale._fields),
+    "gyroscope": tuple((Scale, name) for name in Scale._fields),
+    "magnetometer": tuple((SoftIron, name) for name in ("sxx", "syy", "szz")),
+}
 #: scale error beyond which an axis reads rather -1 times what it should than nothing
 _REVERSED = -1.5
 
@@ -67,22 +74,22 @@ def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
 def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | None:
     """Return findings with the axes that a fit has found to read about -1 times what they should; None if it has none.
 
-    A scale error of -2 is a reversed column. Where the axis hardly shows, as one along which a sensor lies near the
-    spin axis, relations between sensors do not tell it before the fit.
+    A scale error of -2 is a reversed column, and so is an axis of a magnetometer at which soft iron takes twice what is
+    there, or one whose readings at a limit stand at the other one. Where the axis hardly shows, as one along which a
+    sensor lies near the spin axis, relations between sensors do not tell it before the fit.
     """
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    for sensor in ("accelerometer", "gyroscope"):
-        id = catalogued(Scale, sensor).id
-        scales = {q.name: (v, e) for q, v, e in zip(fit.parameters, fit.at, sd, strict=True) if q.group == id}
-        signs = [
-            "-" if v + 3.0 * e < _REVERSED else "" for v, e in (scales.get(name, (0.0, 0.0)) for name in Scale._fields)
-        ]
-        if any(signs):
-            axes = effect_of(Axes(" ".join(map("".join, zip(signs, "xyz", strict=True)))), sensor)
-            meant = tuple(corrected(one, [axes]) for one in findings.recordings)
-            faults = with_fault(findings.faults, SetupFault(axes, float("inf"), None))
-            return SetupFindings(tuple(faults), meant, findings.hints)
-    return None
+    at = {(q.group, q.name): v + 3.0 * e for q, v, e in zip(fit.parameters, fit.at, sd, strict=True)}
+    limits = at_limits(fit)
+    signs = {}
+    for sensor, names in _AXES_OF.items():
+        back = [at.get((catalogued(kind, sensor).id, name), 0.0) < _REVERSED for kind, name in names]
+        beyond = [(sensor, axis) in limits and limits[sensor, axis].reversed for axis in range(3)]
+        # a fit with a scale of -1 has what stands at a limit on the right side
+        signs[sensor] = np.where(np.logical_or(back, beyond), -1.0, 1.0)
+    if all(np.all(own > 0.0) for own in signs.values()):
+        return None
+    return with_axes_of_signs(findings, signs)
 
 
 def with_those_borne_out(findings: SetupFindings, written: Sequence[Recording], fit: Fit) -> SetupFindings | None:

@@ -17,7 +17,7 @@ from discsim.validation.diagnosis.selection.candidates import CandidateEffect, i
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start
-from discsim.validation.diagnosis.selection.offers import Offer, in_chi2, in_turn
+from discsim.validation.diagnosis.selection.offers import Offer, begun_as_tried, in_chi2, in_turn
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import (
     ScreenedCandidate,
@@ -188,13 +188,14 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
         ]
     found = _with_lost_samples(found, current)
     shown: list[Offer] = []
+    tried: list[Offer] = []
     for item in searched(found.relaxed_fit, current, found.own, steady_noise(found), found.lost_samples.found):
         if isinstance(item, Shifted):
             shown.append((item.screened, item.in_place_of(found.relaxed_fit), item.cost))
-        elif current.hypothesis.candidates:
-            here.append((item, found.relaxed_fit if distant else current.fit, 0.0))
-        else:
-            shown.append((item, found.relaxed_fit, 0.0))
+            continue
+        beside = bool(current.hypothesis.candidates)
+        tried.append((item, current.fit if beside and not distant else found.relaxed_fit, 0.0))
+        (here if beside else shown).append(tried[-1])
     if not distant:
         # no more can be gained than is left: about segments that one recording has wrong algebra promises anything.
         # A limit at which readings stand moves nothing in a fit, and these readings are no part of what is left
@@ -209,6 +210,7 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     # slopes promise
     first = not distant and not in_turn(here)
     worth = in_turn(shown, there, here) if first else in_turn([*there, *shown], here)
+    worth = begun_as_tried(worth, tried)
     present = {candidate.id for candidate in current.hypothesis.candidates}
     told = [hint for hint in found.hints if hint.candidate.id not in present]
     # what a lag holds dies away too fast for slopes at no lag to tell

@@ -10,7 +10,7 @@ from discsim.validation.diagnosis.selection.evidence import charge, price
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.identification.gauss_newton import Fit
 
-__all__ = ["Offer", "in_chi2", "in_turn"]
+__all__ = ["Offer", "begun_as_tried", "in_chi2", "in_turn"]
 
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
 Offer: TypeAlias = tuple[ScreenedCandidate, Fit, float]
@@ -25,6 +25,20 @@ def in_turn(*offers: Sequence[Offer]) -> list[Offer]:
 
     worth = [sorted((o for o in some if o[0].gain > 0.5 * price(o[0].candidate)), key=later) for some in offers]
     return [offer for turn in zip_longest(*worth) for offer in turn if offer is not None]
+
+
+def begun_as_tried(offers: Sequence[Offer], tried: Sequence[Offer]) -> list[Offer]:
+    """Return offers in their turn, each with the size at which a detector has ``tried`` the same numbers, if one has.
+
+    A linear question is right about small sizes: of an offset over the corners of a ramp it tells a part, and a fit
+    that begins there may end there.
+    """
+    sizes = {(_effect(one), frozenset(one[0].start)): one for one in reversed(tried)}
+    return [sizes.get((_effect(one), frozenset(one[0].start)), one) for one in offers]
+
+
+def _effect(offer: Offer) -> tuple[str, frozenset[int] | None]:
+    return offer[0].candidate.id, offer[0].candidate.recordings
 
 
 def in_chi2(offer: Offer) -> float:

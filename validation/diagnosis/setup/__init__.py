@@ -1,13 +1,11 @@
 """Faults of the setup, found before anything is fitted: `find_setup_faults`."""
 
+from discsim.validation.diagnosis.setup.axes_by_fit import with_axes_of_signs
+from discsim.validation.diagnosis.setup.faults import SetupFault, SetupFindings, said, with_fault
 from discsim.validation.diagnosis.setup.find import (
-    SetupFault,
-    SetupFindings,
     find_setup_faults,
-    said,
     setup_notes,
     suspected_fault,
-    with_fault,
     with_likeliest_fault,
     with_turned_board,
 )
@@ -19,6 +17,7 @@ __all__ = [
     "said",
     "setup_notes",
     "suspected_fault",
+    "with_axes_of_signs",
     "with_fault",
     "with_likeliest_fault",
     "with_turned_board",

@@ -7,19 +7,28 @@ they are: a fault is named only where the sensors contradict one another as writ
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from discsim.arrays import FloatArray, within_half_turn
+from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
-from discsim.effects.kind import BOARD
 from discsim.effects.sensors import ClockRate, HardIron, Lag
-from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteField, TimeOffset, axes_of, permutation
-from discsim.recording import Recording, Samples
+from discsim.effects.setup import TimeOffset
+from discsim.recording import Recording
+from discsim.validation.diagnosis.setup.axes_by_fit import with_axes_that_follow
+from discsim.validation.diagnosis.setup.faults import (
+    LateFault,
+    SetupFault,
+    SetupFindings,
+    SuspectedFault,
+    effect_of_hypothesis,
+    with_fault,
+)
 from discsim.validation.diagnosis.setup.hypotheses import (
     LATEST,
+    MOST_TWINS,
+    TWIN,
     Hypothesis,
     Ranking,
     board_effect,
@@ -27,24 +36,21 @@ from discsim.validation.diagnosis.setup.hypotheses import (
     hypotheses,
     pairs,
 )
+from discsim.validation.diagnosis.setup.judged import judgeable
 from discsim.validation.diagnosis.setup.late_sensor import SHORTEST, LateSensor, late_sensor
-from discsim.validation.diagnosis.setup.proof import left_by_short_fit
-from discsim.validation.diagnosis.setup.reference import believed, field_is_folded, reference_doubts
-from discsim.validation.diagnosis.setup.remedy import MapAxes, place_instead, remedy
+from discsim.validation.diagnosis.setup.proof import REFUTED, left_by_short_fit, told_apart
+from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
+from discsim.validation.diagnosis.setup.remedy import place_instead, remedy
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
 from discsim.validation.diagnosis.setup.units import clock_doubts, clock_unit, sensor_units
 from discsim.validation.identification.plants import Plant, plant_of
 from discsim.written import corrected, require_seconds
 
 __all__ = [
-    "SetupFault",
-    "SetupFindings",
     "find_setup_faults",
     "may_be_physics",
-    "said",
     "setup_notes",
     "suspected_fault",
-    "with_fault",
     "with_likeliest_fault",
     "with_turned_board",
 ]
@@ -61,96 +67,11 @@ AGREE, SOUND = 0.6, 0.25
 #: no relation may be left to hold worse than this, cost per statement: 7 ordinary errors. A turned board that empties a
 #: gyroscope of clipped readings can hide lost samples at the price of 36 ordinary errors in another relation
 WORST = 2.1
-#: a hypothesis that costs no more than this above the best cannot be told from it
-TWIN = 8.0
 #: a board is turned whose gyroscope and magnetometer see the spin this far off the board's z, rad, and apart by less
 #: than this share of it: a wobble that dies moves an axis by 0.003, a soft iron of some per cent the field's by 0.02
 _TILTED, _ALIKE = 0.02, 0.5
-#: what is judged of a long recording turns at this share of the fastest rate or more, asked every so many s (half a
-#: turn at 6 rad/s), of a slow log every so many readings: one alone scatters about no mean
-_QUARTER, _SLOT, _READINGS = 0.25, 0.5, 4
-#: most faults of one setup that are looked for, and most twins that are told
-MOST, MOST_TWINS = 3, 8
-
-
-@dataclass(frozen=True)
-class SetupFault:
-    """A fault as an effect of the catalogue, its gain (twice the log likelihood, and on recordings set aside), twins.
-
-    ``twins`` are effects, in place of this one, that these recordings cannot tell from it. ``place`` is where the
-    accelerometer would sit on a board that is not turned, m, where that would do as well.
-    """
-
-    effect: Effect
-    gain: float
-    heldout_gain: float | None
-    twins: tuple[Effect, ...] = ()
-    place: tuple[float, float, float] | None = None
-
-    @property
-    def id(self) -> str:
-        """The effect's id."""
-        return self.effect.id
-
-    @property
-    def of_axes(self) -> bool:
-        """Whether it is a sensor whose columns hold other axes than they say."""
-        return isinstance(self.effect.value, Axes)
-
-    @property
-    def sentence(self) -> str:
-        """What is wrong, what else it could be, and what mends it."""
-        return self.advice()
-
-    def advice(self, axes: Mapping[str, MapAxes] | None = None) -> str:
-        """Return the sentence with the line for an import map that now has these ``axes``."""
-        text = said(self.effect)
-        alike = [said(one) for one in self.twins]
-        if self.place is not None:
-            where = ", ".join(f"{axis:.4g}" for axis in self.place)
-            alike.append(f"the accelerometer's position_m is stated wrongly (its sign, say), and is [{where}]")
-        if alike:
-            text += "; these recordings cannot tell that from: " + "; ".join(alike)
-        return f"{text}; {remedy(self.effect, axes)}"
-
-
-@dataclass(frozen=True)
-class LateFault(SetupFault):
-    """A sensor whose clock is another's, told by the spin that both show and not by the phase."""
-
-    told: LateSensor | None = None
-
-    def advice(self, axes: Mapping[str, MapAxes] | None = None) -> str:
-        """Return the sentence with how sure the offset is."""
-        assert self.told is not None
-        return f"{self.told.what}: {self.told.why}; {remedy(self.effect, axes)}"
-
-
-class SuspectedFault(SetupFault):
-    """A fault that would make the sensors agree and gains too little to be named."""
-
-    def advice(self, axes: Mapping[str, MapAxes] | None = None) -> str:
-        """Return the sentence as a supposition."""
-        return f"perhaps {super().advice(axes)}; too little turned here to be sure: a second throw or spin would tell"
-
-
-@dataclass(frozen=True)
-class SetupFindings:
-    """The faults of a setup, and the recordings as they were meant, in the order in which they were given."""
-
-    faults: tuple[SetupFault, ...]
-    recordings: tuple[Recording, ...]
-    #: physics that would make the sensors agree where no fault does: a lag, a clock, iron, of about this size
-    hints: tuple[Effect, ...] = ()
-    #: what is wrong with rate references and commands, by which nothing else is then judged
-    doubts: tuple[str, ...] = ()
-    #: what contradicts a rate reference, a command, or a clock by the stated rates, of which either may be wrong
-    contradictions: tuple[str, ...] = ()
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """The faults as effects."""
-        return tuple(fault.effect for fault in self.faults)
+#: most faults of one setup that are looked for
+MOST = 3
 
 
 def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
@@ -171,7 +92,7 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     doubts = [list(reference_doubts(one)) for one in current]
 
     def judged() -> list[Recording]:
-        return [_judgeable(believed(one, own)) for one, own in zip(current, doubts, strict=True)]
+        return [judgeable(believed(one, own)) for one, own in zip(current, doubts, strict=True)]
 
     if not all(one.samples for one in judged()):
         return SetupFindings(tuple(faults), current, contradictions=clocks)
@@ -230,29 +151,12 @@ def _offset(late: LateSensor) -> Effect:
     return effect_of(TimeOffset(late.late), late.sensor)
 
 
-def with_fault(faults: Sequence[SetupFault], further: SetupFault) -> list[SetupFault]:
-    """Return faults with one more, found in readings that are corrected for them: axes of one sensor become one fault.
-
-    None is left where the second puts back what the first has taken.
-    """
-    before = next((one for one in faults if one.id == further.id), None)
-    if before is None or not further.of_axes:
-        return [*faults, further]
-    both = permutation(before.effect.value) @ permutation(further.effect.value)
-    rest = [one for one in faults if one is not before]
-    if np.array_equal(both, np.eye(3)):
-        return rest
-    effect = effect_of(Axes(axes_of(both)), further.effect.row.acts_on)
-    gain = max(before.gain, further.gain)
-    return [*rest, replace(further, effect=effect, gain=gain, twins=(), place=None)]
-
-
 def suspected_fault(findings: SetupFindings) -> SuspectedFault | None:
     """Return the fault that makes sensors agree and gains too little to be named, as of one short throw; None if none.
 
     Where some fault was found already, or a rate reference is doubted, nothing more is suspected.
     """
-    recordings = [_judgeable(one) for one in findings.recordings]
+    recordings = [judgeable(one) for one in findings.recordings]
     if findings.faults or findings.hints or findings.doubts or not all(one.samples for one in recordings):
         return None
     ranking = hypotheses(recordings, _SUSPECT)
@@ -277,19 +181,20 @@ def setup_notes(findings: SetupFindings, done: str) -> list[str]:
     return notes
 
 
-def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:
+def with_likeliest_fault(findings: SetupFindings, blamed: Collection[str] = ()) -> SetupFindings | None:
     """Return findings with one more fault that gains most, though relations hold badly with it; None if none gains.
 
-    Physics beside a fault, as a field that changes with height, may spoil relations that the fault does not. It is a
-    supposition, for whoever can test it otherwise: by whether a motion follows the sensors then.
+    Physics beside a fault, as a field that changes with height, may spoil relations that the fault does not. Where no
+    relation tells, the axes of ``blamed`` sensors are told by short fits. It is a supposition, for whoever can test it
+    otherwise: by whether a motion follows the sensors then.
     """
-    recordings = [_judgeable(one) for one in findings.recordings]
+    recordings = [judgeable(one) for one in findings.recordings]
     if len(findings.faults) == MOST or not all(one.samples for one in recordings):
         return None
     ranking = hypotheses(recordings, PRICE)
     found = ranking.found
     if not found or found[0].kind == "rival" or not _gains(ranking.as_written, found[0]):
-        return None
+        return with_axes_that_follow(findings, blamed)
     fault = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
     current = tuple(corrected(one, [fault.effect]) for one in findings.recordings)
     return SetupFindings(tuple(with_fault(findings.faults, fault)), current)
@@ -301,7 +206,7 @@ def with_turned_board(findings: SetupFindings) -> SetupFindings | None:
     Both show the axis of the spin, and no time enters that: it tells a turned board where rows that were lost or late
     spoil every relation. Two chips that are each turned in the board show two axes.
     """
-    recordings = [_judgeable(one) for one in findings.recordings]
+    recordings = [judgeable(one) for one in findings.recordings]
     plant = plant_of(recordings[0])
     if findings.faults or not plant.airborne or plant.air_modelled or not all(one.samples for one in recordings):
         return None
@@ -322,63 +227,6 @@ def _angle(one: FloatArray | None, other: FloatArray | None) -> float:
     assert one is not None
     assert other is not None
     return float(np.arccos(np.clip(abs(float(one @ other)), 0.0, 1.0)))
-
-
-def _judgeable(recording: Recording) -> Recording:
-    """Return the part of a recording that is judged: where it turns most, if it is long.
-
-    Without its magnetometer where the field is not stated: nothing tells what it should read; nor where the reference
-    turns too fast for its readings: a field that is folded seems to go the other way round. Without a sensor of the
-    board of which an axis was never read, or every reading is the same: what is dead agrees with any order of axes.
-    """
-    kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
-    if not recording.environment.field_known or field_is_folded(recording):
-        kept.pop("magnetometer", None)
-    busiest = _busiest(kept, plant_of(recording).durations.setup)
-    if busiest is not None:
-        kept = {name: samples.between(*busiest) for name, samples in kept.items()}
-    return replace(recording, samples=kept)
-
-
-def _alive(samples: Samples) -> bool:
-    """Tell a sensor that was read on every axis and whose readings are not all the same."""
-    value = samples.value if samples.value.ndim == 2 else samples.value[:, None]
-    read = np.isfinite(value)
-    if not read.any(axis=0).all():
-        return False
-    first = value[read.argmax(axis=0), np.arange(value.shape[1])]
-    return len(samples) == 1 or bool(np.any(read & (value != first)))
-
-
-def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, float] | None:
-    """Return from when to when, s, sensors turn on end in a recording longer than ``length`` s, at most that long.
-
-    The longest stretch that turns at a quarter of the fastest rate or more; None of a shorter recording. Where that
-    sensor is shorter and another is not, whose clock may have jumped, from its first reading on.
-    """
-    turning = next((samples[name] for name in ("gyroscope", "magnetometer", "accelerometer") if name in samples), None)
-    if turning is None or len(turning) < 2:
-        return None
-    if turning.t[-1] - turning.t[0] <= length:
-        longer = any(len(one) and one.t[-1] - one.t[0] > length for one in samples.values())
-        return (float(turning.t[0]), float(turning.t[0]) + length) if longer else None
-    width = max(_SLOT, _READINGS * float(turning.t[-1] - turning.t[0]) / (len(turning) - 1))
-    slot = ((turning.t - turning.t[0]) / width).astype(int)
-    count = np.maximum(np.bincount(slot), 1)
-    value = np.nan_to_num(turning.value)
-    square = np.bincount(slot, np.sum(value**2, axis=1)) / count
-    if turning is not samples.get("gyroscope"):
-        # what turns scatters about its mean
-        mean = np.stack([np.bincount(slot, column) for column in value.T], axis=1) / count[:, None]
-        square = np.maximum(square - np.sum(mean**2, axis=1), 0.0)
-    fast = np.concatenate([[False], square > _QUARTER**2 * np.max(square), [False]])
-    starts, stops = np.flatnonzero(~fast[:-1] & fast[1:]), np.flatnonzero(fast[:-1] & ~fast[1:])
-    if not starts.size:
-        # a sensor that steps from one reading to another once shows no turning in any slot
-        return float(turning.t[0]), float(turning.t[0]) + length
-    longest = int(np.argmax(stops - starts))
-    first = float(turning.t[0]) + width * float(starts[longest])
-    return first, first + min(length, width * float(stops[longest] - starts[longest]))
 
 
 def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effect, ...]]:
@@ -403,7 +251,7 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
     for both, one, other in pairs(ranking.base)[:1]:
         if _agrees(both) and _gains(as_written, both, 2.0):
             gain = float("inf") if before is None else float(np.sum(before) - both.cost)
-            return [SetupFault(_effect(item, site), gain, None) for item in (one, other)], ()
+            return [SetupFault(effect_of_hypothesis(item, site), gain, None) for item in (one, other)], ()
     return [], _hints(ranking)
 
 
@@ -436,39 +284,12 @@ def _fault(as_written: Hypothesis | None, found: Sequence[Hypothesis], recording
     site = recordings[0].environment.magnetic_field
     before = None if as_written is None else as_written.costs
     tied = [item for item in found if _may_be_meant(item, found[0], plant_of(recordings[0]))]
-    best, others = _told_apart(tied, recordings, site)
-    twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
+    best, others = told_apart(tied, recordings, site)
+    twins = [effect_of_hypothesis(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
     gain = float("inf") if before is None else float(np.sum(before) - best.cost)
-    effects = (_effect(best, site), *twins[:MOST_TWINS])
+    effects = (effect_of_hypothesis(best, site), *twins[:MOST_TWINS])
     place = next((at for one in effects if (at := place_instead(one, recordings[0])) is not None), None)
     return SetupFault(effects[0], gain, _heldout(before, best, found), effects[1:], place)
-
-
-#: most hypotheses that short fits are made of; a twin is refuted where it leaves this many times more
-_FITTED, _REFUTED = 6, 2.0
-
-
-def _told_apart(
-    tied: Sequence[Hypothesis], recordings: Sequence[Recording], site: FloatArray
-) -> tuple[Hypothesis, list[Hypothesis]]:
-    """Return the best of hypotheses that cost the same, and those that cannot be told from it.
-
-    In a flight the air tells them apart. A magnetometer with all columns reversed is a field of the other direction:
-    of those two the columns are named.
-    """
-    tied = sorted(tied, key=lambda item: _turned_round(item, site))
-    if len(tied) == 1 or not plant_of(recordings[0]).air_modelled:
-        return tied[0], list(tied[1:])
-    some = chosen(recordings)
-    left = [left_by_short_fit([corrected(one, [_effect(item, site)]) for one in some]) for item in tied[:_FITTED]]
-    alike = [k for k in range(len(left)) if left[k] < _REFUTED * min(left)]
-    best = min(alike, key=lambda k: (_turned_round(tied[k], site), left[k]))
-    return tied[best], [tied[k] for k in alike if k != best]
-
-
-def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
-    """Tell whether a hypothesis is a field that points the other way than the stated one: no place on a map has it."""
-    return item.columns.site is not None and float(item.columns.site @ stated) < 0.0
 
 
 def _worth_naming(as_written: Hypothesis | None, item: Hypothesis, recordings: Sequence[Recording]) -> bool:
@@ -488,8 +309,8 @@ def _borne_out(as_written: Hypothesis | None, item: Hypothesis, recordings: Sequ
     if not plant_of(recordings[0]).air_modelled or not _gains(as_written, item, _PRICE_IN_AIR / PRICE):
         return False
     some = chosen(recordings)
-    meant = [corrected(one, [_effect(item, some[0].environment.magnetic_field)]) for one in some]
-    return _REFUTED * left_by_short_fit(meant) < left_by_short_fit(some)
+    meant = [corrected(one, [effect_of_hypothesis(item, some[0].environment.magnetic_field)]) for one in some]
+    return REFUTED * left_by_short_fit(meant) < left_by_short_fit(some)
 
 
 def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: Plant) -> bool:
@@ -526,50 +347,3 @@ def _heldout(before: FloatArray | None, best: Hypothesis, found: Sequence[Hypoth
         choice = min(same, key=lambda item: item.charged - item.costs[i])
         gain += 0.5 * float(before[i] - choice.costs[i])
     return gain
-
-
-# ---------------------------------------------------------------------------------------------- as effects
-
-
-def _effect(item: Hypothesis, stated: FloatArray) -> Effect:
-    """Return a hypothesis as an effect of the catalogue; ``stated`` (3,) is the stated field, uT."""
-    if item.kind == "axes":
-        kind = GpsAxes if item.sensor == "gps" else Axes
-        return effect_of(kind(axes_of(item.columns.of(item.sensor).T, item.sensor)), item.sensor)
-    if item.kind == "offset":
-        return effect_of(TimeOffset(item.columns.offset[item.sensor]), item.sensor)
-    if item.kind == "board":
-        return board_effect(next(iter(item.columns.axes.values())))
-    assert item.columns.site is not None
-    return effect_of(SiteField(*_apart(item.columns.site, stated)))
-
-
-def _apart(site: FloatArray, stated: FloatArray) -> tuple[float, float, float]:
-    """Return by how much a field (3,) is turned about down, dips further, and is larger than another."""
-    turned = np.arctan2(site[1], site[0]) - np.arctan2(stated[1], stated[0])
-    dip = [float(np.arctan2(b[2], np.hypot(b[0], b[1]))) for b in (site, stated)]
-    return float(within_half_turn(turned)), dip[0] - dip[1], float(np.linalg.norm(site) / np.linalg.norm(stated))
-
-
-# ---------------------------------------------------------------------------------------------- in words
-
-
-def said(fault: Effect) -> str:
-    """Return what an effect of the setup means for the file that was written."""
-    value = fault.value
-    sensor = "GPS" if fault.row.acts_on == "gps" else fault.row.acts_on
-    if isinstance(value, Axes | GpsAxes):
-        columns = "north, east, down" if isinstance(value, GpsAxes) else "x, y, z"
-        return f"the {sensor}'s columns {columns} hold {value.axes.replace(' ', ', ')} of the true axes"
-    if isinstance(value, TimeOffset):
-        return f"the {sensor}'s times are {1e3 * value.offset_s:+.1f} ms off"
-    if isinstance(value, BoardRotation):
-        degrees = ", ".join(f"{np.degrees(angle):+.1f}" for angle in value)
-        return f"the sensor board is turned in the body by the rotation vector ({degrees}) deg"
-    if isinstance(value, SiteField):
-        return (
-            f"the field that is there is turned by {np.degrees(value.declination_rad):+.1f} deg about down, dips "
-            f"{np.degrees(value.inclination_rad):+.1f} deg further and is {value.ratio:.3f} times the stated one"
-        )
-    names = "times of all sensors" if isinstance(value, ClockUnit) else f"{sensor}'s numbers"
-    return f"the {names} are in {value.written_in}"

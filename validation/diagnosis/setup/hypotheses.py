@@ -27,12 +27,27 @@ from discsim.validation.identification.ordinary_errors import ordinary_sigma
 from discsim.validation.identification.plants import plant_of
 from discsim.written import corrected
 
-__all__ = ["LATEST", "PERMUTATIONS", "Hypothesis", "Ranking", "board_effect", "chosen", "hypotheses", "pairs"]
+__all__ = [
+    "LATEST",
+    "MOST_TWINS",
+    "PERMUTATIONS",
+    "TWIN",
+    "Hypothesis",
+    "Ranking",
+    "board_effect",
+    "chosen",
+    "hypotheses",
+    "pairs",
+]
 
 #: sensors that sit on the board
 BOARD = ("magnetometer", "gyroscope", "accelerometer")
 #: so many recordings tell as much as all
 MOST = 4
+#: a hypothesis that costs no more than this above the best cannot be told from it
+TWIN = 8.0
+#: most of those that are told
+MOST_TWINS = 8
 #: largest offset of time that is looked for, s, and how far the phase turns between two that are tried, rad
 LATEST, PHASE_STEP = 0.15, 0.25
 #: lags that are tried as rivals, as phases, rad; clocks are tried as far as a relaxed fit lets one go
