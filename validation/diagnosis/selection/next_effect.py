@@ -189,7 +189,8 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     found = _with_lost_samples(found, current)
     shown: list[Offer] = []
     tried: list[Offer] = []
-    for item in searched(found.relaxed_fit, current, found.own, steady_noise(found), found.lost_samples.found):
+    steady = steady_noise(found)
+    for item in searched(found.relaxed_fit, current, found.own, steady, found.lost_samples.found):
         if isinstance(item, Shifted):
             shown.append((item.screened, item.in_place_of(found.relaxed_fit), item.cost))
             continue
@@ -197,10 +198,14 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
         tried.append((item, current.fit if beside and not distant else found.relaxed_fit, 0.0))
         (here if beside else shown).append(tried[-1])
     if not distant:
-        # no more can be gained than is left: about segments that one recording has wrong algebra promises anything.
-        # A limit at which readings stand moves nothing in a fit, and these readings are no part of what is left
-        left = chi2_in(current, found.relaxed_noise)
-        there, shown = ([offer for offer in some if in_chi2(offer) < left] for some in (there, shown))
+        # no more can be gained than is left, each in the noise in which it was asked: about segments that one recording
+        # has wrong algebra promises anything. A limit at which readings stand moves nothing in a fit, and these
+        # readings are no part of what is left
+        asked = ((there, found.relaxed_noise), (shown, steady))
+        left = (chi2_in(current, noise) for _, noise in asked)
+        there, shown = (
+            [offer for offer in some if in_chi2(offer) < most] for (some, _), most in zip(asked, left, strict=True)
+        )
     # what the two promise does not compare: far from the data they are asked in different noise, and near them the
     # segments of a fit that follows may promise much of a sensor that has nothing to gain
     there, shown, here = (
