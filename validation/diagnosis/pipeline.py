@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from discsim.effects.own import UserEffect
-from discsim.effects.sensors import DroppedSamples
+from discsim.effects.sensors import DroppedSamples, Latency
 from discsim.effects.setup import Axes, BoardRotation, TimeOffset
 from discsim.errors import InputError
 from discsim.recording import Recording
@@ -40,6 +40,7 @@ from discsim.validation.diagnosis.setup_effects import (
     free_parameters,
     with_reversed_axes,
     with_those_borne_out,
+    with_times_of_another,
     without_faults,
 )
 from discsim.validation.diagnosis.stages import Prepared, Question, Tried
@@ -292,6 +293,22 @@ def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
     return _without(tried, question, TimeOffset) if losing or not _explains(tried) else None
 
 
+def times_of_another(tried: Tried, question: Question) -> SetupFindings | None:
+    """Suppose that the times of another sensor are off, where fixes would have to be off, too, or more is left.
+
+    Two sensors that are late against each other may each be the one: what moves along with the other tells.
+    """
+    found = tried.found
+    if found is None:
+        return None
+    moved = any(
+        candidate.row.acts_on == "gps" and candidate.row.type in (TimeOffset, Latency)
+        for candidate in found.final.hypothesis.candidates
+    )
+    asked = moved or not _explains(tried)
+    return with_times_of_another(tried.prepared.setup, question.recordings) if asked else None
+
+
 def axes_as_written(tried: Tried, question: Question) -> SetupFindings | None:
     """Suppose that no board and no axes are turned, where turned ones leave more than noise, or reverse axes again.
 
@@ -321,6 +338,7 @@ def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
 #: what is supposed of the setup once effects were searched, one after the other, and the test of whether it stands
 _SUPPOSITIONS = (
     (likeliest_fault, _follows),
+    (times_of_another, _explains_with_less),
     (times_as_written, _explains_all),
     (axes_as_written, _explains_with_less),
     (reversed_axes, _follows_as_well),

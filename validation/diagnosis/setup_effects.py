@@ -43,6 +43,7 @@ __all__ = [
     "on_board_axes",
     "with_reversed_axes",
     "with_those_borne_out",
+    "with_times_of_another",
     "without_faults",
 ]
 
@@ -92,6 +93,20 @@ def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | Non
     return with_axes_of_signs(findings, signs)
 
 
+def with_times_of_another(findings: SetupFindings, written: Sequence[Recording]) -> SetupFindings | None:
+    """Return findings with the times of another sensor at fault, which did as well before the fit; None if none did.
+
+    ``written`` are the recordings as they stand in their files.
+    """
+    for fault in findings.faults:
+        others = [twin for twin in fault.twins if (twin.row.type, fault.effect.row.type) == (TimeOffset, TimeOffset)]
+        if others:
+            other = replace(fault, effect=others[0], twins=(fault.effect,))
+            faults = [other if one is fault else one for one in findings.faults]
+            return replace(findings, faults=tuple(faults), recordings=_as_meant(faults, written))
+    return None
+
+
 def with_those_borne_out(findings: SetupFindings, written: Sequence[Recording], fit: Fit) -> SetupFindings | None:
     """Return findings without the faults whose numbers a fit has brought back to none; None if there are no such.
 
@@ -118,10 +133,15 @@ def _with_only(
     """Return findings with some of their faults, None if those are all; ``written`` are the recordings of the files."""
     if len(kept) == len(findings.faults):
         return None
+    return replace(findings, faults=tuple(kept), recordings=_as_meant(kept, written))
+
+
+def _as_meant(faults: Sequence[SetupFault], written: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Return recordings as they were meant, of those ``written`` with some faults."""
     meant = tuple(written)
-    for fault in kept:
+    for fault in faults:
         meant = tuple(corrected(one, [fault.effect]) for one in meant)
-    return replace(findings, faults=tuple(kept), recordings=meant)
+    return meant
 
 
 def _borne_out(fault: Effect, fit: Fit) -> bool:

@@ -1,6 +1,5 @@
 """Faults of the setup, found before anything is fitted: `find_setup_faults`."""
 
-from discsim.validation.diagnosis.setup.axes_by_fit import with_axes_of_signs
 from discsim.validation.diagnosis.setup.faults import SetupFault, SetupFindings, said, with_fault
 from discsim.validation.diagnosis.setup.find import (
     find_setup_faults,
@@ -9,6 +8,7 @@ from discsim.validation.diagnosis.setup.find import (
     with_likeliest_fault,
     with_turned_board,
 )
+from discsim.validation.diagnosis.setup.told_by_fit import with_axes_of_signs
 
 __all__ = [
     "SetupFault",

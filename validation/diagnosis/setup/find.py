@@ -16,7 +16,6 @@ from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.sensors import ClockRate, HardIron, Lag
 from discsim.effects.setup import TimeOffset
 from discsim.recording import Recording
-from discsim.validation.diagnosis.setup.axes_by_fit import with_axes_that_follow
 from discsim.validation.diagnosis.setup.faults import (
     LateFault,
     SetupFault,
@@ -42,6 +41,7 @@ from discsim.validation.diagnosis.setup.proof import REFUTED, left_by_short_fit,
 from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.diagnosis.setup.remedy import place_instead, remedy
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
+from discsim.validation.diagnosis.setup.told_by_fit import with_fault_that_follows
 from discsim.validation.diagnosis.setup.units import clock_doubts, clock_unit, sensor_units
 from discsim.validation.identification.plants import Plant, plant_of
 from discsim.written import corrected, require_seconds
@@ -194,7 +194,7 @@ def with_likeliest_fault(findings: SetupFindings, blamed: Collection[str] = ()) 
     ranking = hypotheses(recordings, PRICE)
     found = ranking.found
     if not found or found[0].kind == "rival" or not _gains(ranking.as_written, found[0]):
-        return with_axes_that_follow(findings, blamed)
+        return with_fault_that_follows(findings, blamed)
     fault = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
     current = tuple(corrected(one, [fault.effect]) for one in findings.recordings)
     return SetupFindings(tuple(with_fault(findings.faults, fault)), current)

@@ -7,8 +7,9 @@ hypothesis, loosely (`discsim.validation.diagnosis.relaxed_fit`), and the one th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,11 +22,12 @@ from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, chosen
 from discsim.validation.identification.gauss_newton import Fit, linearised, refit
 from discsim.validation.identification.noise import stated_noise
 from discsim.validation.identification.other_side import at_limits
+from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import plant_of
 from discsim.validation.identification.stated_parameters import stated_parameters
 from discsim.written import corrected
 
-__all__ = ["REFUTED", "left_by_short_fit", "told_apart"]
+__all__ = ["REFUTED", "ShortFit", "left_by_short_fit", "short_fit", "told_apart"]
 
 #: how much of a flight is followed, s, in how many recordings, with how many steps
 _LENGTH, _RECORDINGS, _STEPS = 1.5, 2, 5
@@ -36,22 +38,45 @@ _LATEST = 60.0
 _FITTED, REFUTED = 6, 2.0
 
 
-@np.errstate(over="ignore", invalid="ignore")
+class ShortFit(NamedTuple):
+    """What a relaxed fit to the beginnings of flights leaves: its merit, of how many readings, and where it ended.
+
+    The merit is infinite where the fit fails. ``at`` holds the numbers that were free beside those of a relaxed fit.
+    """
+
+    merit: float
+    readings: int
+    at: Mapping[str, float]
+
+    @property
+    def left(self) -> float:
+        """The merit per reading."""
+        return self.merit / max(self.readings, 1)
+
+
 def left_by_short_fit(recordings: Sequence[Recording]) -> float:
-    """Return the merit per reading that a relaxed fit to the beginnings of flights leaves; infinite where it fails.
+    """Return the merit per reading that a relaxed fit to the beginnings of flights leaves; infinite where it fails."""
+    return short_fit(recordings).left
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def short_fit(recordings: Sequence[Recording], free: Sequence[Parameter] = ()) -> ShortFit:
+    """Return a relaxed fit to the beginnings of flights; ``free`` are numbers that may move beside its own.
 
     Readings at a limit take no part in a fit, and count here where they stand on the other side than the motion.
     """
     some = [_early(one) for one in list(recordings)[:_RECORDINGS]]
     trajectories = tuple(beginning(first_trajectory(one), _LENGTH) for one in some)
     sensors = {readings.sensor for one in trajectories for readings in one.readings}
-    parameters = (*stated_parameters(some), *unknowns(some), *ordinary(sensors, some[0].plant))
+    parameters = (*stated_parameters(some), *unknowns(some), *ordinary(sensors, some[0].plant), *free)
     at = np.array([q.stated for q in parameters])
     fit = Fit(trajectories, parameters, at, trajectories[0].plant.sizes.relaxed, {})
     bare = linearised(fit, ())
     fit = refit(replace(fit, noise=stated_noise(bare)), iterations=_STEPS, tolerance=1e-3 * fit.count)
-    merit = (fit.merit + sum(one.chi2 for one in at_limits(fit).values())) / max(fit.count, 1)
-    return float(merit) if np.isfinite(merit) else float("inf")
+    merit = float(fit.merit + sum(one.chi2 for one in at_limits(fit).values()))
+    asked = {q.key for q in free}
+    ended = {q.name: float(v) for q, v in zip(fit.parameters, fit.at, strict=True) if q.key in asked}
+    return ShortFit(merit if np.isfinite(merit) else float("inf"), fit.count, ended)
 
 
 def _early(recording: Recording) -> Recording:

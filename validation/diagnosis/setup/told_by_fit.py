@@ -1,8 +1,8 @@
-"""Axes that no relation between sensors shows, told by fits.
+"""Axes and times that no relation between sensors shows, told by fits.
 
-Without a magnetometer, or with one alone, nothing that holds whatever the air does tells how columns lie; a motion of
-the plant does. Takes findings; gives them with the axes of one sensor that short fits of a flight, or a fit of
-everything, bear out, and which other axes these recordings cannot tell from them.
+Without a magnetometer, or with one alone, nothing that holds whatever the air does tells how columns lie and whether
+two sensors count from one instant; a motion of the plant does. Takes findings; gives them with the fault of one sensor
+that short fits of a flight, or a fit of everything, bear out, and what else these recordings cannot tell from it.
 """
 
 from __future__ import annotations
@@ -14,29 +14,35 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.kind import BOARD
-from discsim.effects.setup import Axes, axes_of
+from discsim.effects.setup import Axes, TimeOffset, axes_of
 from discsim.recording import Recording
 from discsim.validation.diagnosis.setup.faults import SetupFault, SetupFindings, effect_of_hypothesis, with_fault
 from discsim.validation.diagnosis.setup.hypotheses import MOST_TWINS, TWIN, Hypothesis, chosen, hypotheses
 from discsim.validation.diagnosis.setup.judged import judgeable
-from discsim.validation.diagnosis.setup.proof import left_by_short_fit
+from discsim.validation.diagnosis.setup.proof import left_by_short_fit, short_fit
+from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import plant_of
 from discsim.written import corrected
 
-__all__ = ["with_axes_of_signs", "with_axes_that_follow"]
+__all__ = ["with_axes_of_signs", "with_fault_that_follows"]
 
 #: what follows leaves less than this many times the best: a merit per reading of a thousand readings scatters by
 #: sqrt(2 / 1000), of which this is two
 _ALIKE = 1.1
+#: sensors whose times are told by fits where there is no magnetometer; the offsets that are tried, s: as far as phases
+#: are asked, at twice what a fit moves one by with ease (a radian at a throw's 50 rad/s); and the step of its slope
+_TIMED = ("accelerometer", "gyroscope")
+_WITHIN, _TIME_STEP = 0.01, 1e-5
+_OFFSETS = np.arange(-7, 8) * 2.0 * _WITHIN
 #: a short fit that leaves more than this per reading follows nothing
 _FOLLOWS = 2.0
 
 
-def with_axes_that_follow(findings: SetupFindings, sensors: Collection[str]) -> SetupFindings | None:
-    """Return findings of flights with the axes of one of some sensors that a motion follows; None where none does.
+def with_fault_that_follows(findings: SetupFindings, sensors: Collection[str]) -> SetupFindings | None:
+    """Return findings of flights with the axes, or the times, of one of some sensors that a motion follows.
 
-    Tried are those that the relations between sensors cannot tell from the axes as they are, first those that leave
-    the spin where it is.
+    None where no motion follows any. Tried are axes that the relations between sensors cannot tell from those as they
+    are, first those that leave the spin where it is; and where no phase of a field tells them, offsets of time.
     """
     recordings = [judgeable(one) for one in findings.recordings]
     if not all(one.samples for one in recordings) or not plant_of(recordings[0]).air_modelled:
@@ -54,7 +60,29 @@ def with_axes_that_follow(findings: SetupFindings, sensors: Collection[str]) -> 
             alike = [k for k in range(len(left)) if left[k] < _ALIKE * min(left)]
             best, *others = sorted(alike, key=lambda k: (tried[k].size, left[k]))
             return _with(findings, effects[best], [effects[k] for k in others])
-    return None
+    return _with_times(findings, some) if {*sensors} & {*_TIMED} else None
+
+
+def _with_times(findings: SetupFindings, some: Sequence[Recording]) -> SetupFindings | None:
+    """Return findings with the offset of a sensor's times that a motion follows; None where none does, or phases tell.
+
+    Of two sensors either may be off against the other: how the path goes on tells which.
+    """
+    if any("magnetometer" in one for one in some) or not all(name in one for name in _TIMED for one in some):
+        return None
+    found = []
+    for sensor in _TIMED:
+        late = effect_of(TimeOffset(0.0), sensor)
+        free = (Parameter(late.id, "offset_s", 0.0, _TIME_STEP, _WITHIN),)
+        for offset in _OFFSETS:
+            tried = effect_of(TimeOffset(float(offset)), sensor)
+            fit = short_fit([corrected(one, [tried]) for one in some], free)
+            found.append((fit, effect_of(TimeOffset(float(offset) + fit.at["offset_s"]), sensor)))
+    best, effect = min(found, key=lambda one: one[0].merit)
+    if best.left > _FOLLOWS:
+        return None
+    alike = [one for one in found if one[0].left < _ALIKE * best.left and one[1].id != effect.id]
+    return _with(findings, effect, [min(alike, key=lambda one: one[0].merit)[1]] if alike else [])
 
 
 def _leaves_axis(item: Hypothesis) -> bool:

@@ -13,8 +13,8 @@ from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_axes_of_signs
-from discsim.validation.diagnosis.setup.axes_by_fit import with_axes_that_follow
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
+from discsim.validation.diagnosis.setup.told_by_fit import with_fault_that_follows
 from discsim.written import as_written
 
 #: rad/s: an ordinary gyroscope's 2000 deg/s, which a thrown disc turns faster than
@@ -57,7 +57,7 @@ def test_without_a_magnetometer_relations_do_not_see_a_reversed_gyroscope_and_a_
     written = [as_written(one, [fault]) for one in flights]
     before = find_setup_faults(written)
     assert before.faults == ()
-    findings = with_axes_that_follow(before, ["gyroscope"])
+    findings = with_fault_that_follows(before, ["gyroscope"])
     assert meant(findings) == (fault,)
     assert findings is not None
     # z stands at its limit all the time: which limit that is tells its sign
@@ -68,7 +68,7 @@ def test_without_a_magnetometer_relations_do_not_see_a_reversed_gyroscope_and_a_
 
 def test_axes_are_asked_only_of_the_sensors_that_are_blamed(flights):
     written = [as_written(one, [effect("gyro.axes", axes="-x -y -z")]) for one in flights]
-    assert with_axes_that_follow(find_setup_faults(written), ["accelerometer"]) is None
+    assert with_fault_that_follows(find_setup_faults(written), ["accelerometer"]) is None
 
 
 def test_a_short_fit_counts_readings_that_stand_at_the_other_limit(flights):
