@@ -48,6 +48,7 @@ from discsim.validation.diagnosis.unknown_law.find import FoundLaw, LawOfAll, fi
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.plants import plant_of
 from discsim.validation.identification.plants.plan import Plan
 from discsim.validation.identification.stated_parameters import stated_parameters
 
@@ -128,7 +129,8 @@ def _prepared_first(question: Question) -> Prepared:
     """Return recordings as they were meant by the faults of their setup.
 
     Where rows must be counted no relation tells that a board is turned: it is where its spin is seen aslant and rows
-    are counted along its axes. Raises `InputError` for a rate reference that the sensors beside it contradict.
+    are counted along its axes. On a rig, whose axis stands still, a spin that is seen aslant is enough. Raises
+    `InputError` for a rate reference that the sensors beside it contradict.
     """
     setup = find_setup_faults(question.recordings)
     if setup.doubts:
@@ -136,7 +138,9 @@ def _prepared_first(question: Question) -> Prepared:
     turned = with_turned_board(setup)
     try:
         ready = None if turned is None else prepared_under(turned, question)
-        return prepared_under(setup, question) if ready is None or ready.rows is None else ready
+        if ready is not None and (ready.rows is not None or not plant_of(ready.meant[0]).airborne):
+            return ready
+        return prepared_under(setup, question)
     except InputError as error:
         if not setup.faults:
             raise

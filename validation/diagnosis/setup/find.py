@@ -70,6 +70,9 @@ WORST = 2.1
 #: a board is turned whose gyroscope and magnetometer see the spin this far off the board's z, rad, and apart by less
 #: than this share of it: a wobble that dies moves an axis by 0.003, a soft iron of some per cent the field's by 0.02
 _TILTED, _ALIKE = 0.02, 0.5
+#: the same on a rig, where a fault that is not there would stand beside all that is sought: five ordinary cross-axis
+#: errors of 0.02
+_TILTED_RIG = 0.1
 #: most faults of one setup that are looked for
 MOST = 3
 
@@ -201,25 +204,39 @@ def with_likeliest_fault(findings: SetupFindings, blamed: Collection[str] = ()) 
 
 
 def with_turned_board(findings: SetupFindings) -> SetupFindings | None:
-    """Return findings of free spins with the board turned as gyroscope and magnetometer alike say, None where not so.
+    """Return findings with the board turned as gyroscope and magnetometer alike say, None where not so.
 
-    Both show the axis of the spin, and no time enters that: it tells a turned board where rows that were lost or late
-    spoil every relation. Two chips that are each turned in the board show two axes.
+    Both show the axis of the spin, and no time enters that: it tells a turned board where rows or samples that were
+    lost or late spoil every relation. Two chips that are each turned in the board show two axes. In a flight, which the
+    air bends, relations are believed alone.
     """
     recordings = [judgeable(one) for one in findings.recordings]
     plant = plant_of(recordings[0])
-    if findings.faults or not plant.airborne or plant.air_modelled or not all(one.samples for one in recordings):
+    if findings.faults or plant.air_modelled or not all(one.samples for one in recordings):
         return None
     axes = [spin_axis(recordings, sensor) for sensor in ("gyroscope", "magnetometer")]
-    turns = board_turns(recordings)
-    if not turns or any(axis is None for axis in axes):
+    if any(axis is None for axis in axes):
         return None
     tilted = min(_angle(axis, np.array([0.0, 0.0, 1.0])) for axis in axes if axis is not None)
-    if tilted < _TILTED or _angle(*axes) > _ALIKE * tilted:
+    if tilted < (_TILTED if plant.airborne else _TILTED_RIG) or _angle(*axes) > _ALIKE * tilted:
         return None
-    effect, *others = (board_effect(turn) for turn in turns)
-    current = tuple(corrected(one, [effect]) for one in findings.recordings)
-    return SetupFindings((SetupFault(effect, float("inf"), None, tuple(others)),), current)
+    effects = _turns(recordings)
+    if not effects:
+        return None
+    current = tuple(corrected(one, effects[:1]) for one in findings.recordings)
+    return SetupFindings((SetupFault(effects[0], float("inf"), None, effects[1:]),), current)
+
+
+def _turns(recordings: Sequence[Recording]) -> tuple[Effect, ...]:
+    """Return the turns of a board that its axis of spin leaves, likeliest first; on a rig those that do as well.
+
+    There gravity, the field along the axis and a rate with a sign tell which end of the axis points down.
+    """
+    if plant_of(recordings[0]).airborne:
+        return tuple(board_effect(turn) for turn in board_turns(recordings))
+    boards = [item for item in hypotheses(recordings).found if item.kind == "board"]
+    alike = [item for item in boards if item.charged < boards[0].charged + TWIN]
+    return tuple(effect_of_hypothesis(item, recordings[0].environment.magnetic_field) for item in alike)
 
 
 def _angle(one: FloatArray | None, other: FloatArray | None) -> float:

@@ -118,8 +118,8 @@ PURE = 0.4
 def turning_line(recording: Recording, sensor: str) -> FloatArray | None:
     """Return the unit vector (3,) in written columns along which the body turns, of either sign.
 
-    By a magnetometer, about which its field turns; by a gyroscope that does not clip, of its mean rate. None where
-    nothing turns.
+    By a magnetometer, about which its field turns; by a gyroscope, of its mean rate: of one that clips only on a rig,
+    whose axis stands still, while it turns slowly enough. None where nothing turns.
     """
     found = usable(recording, sensor)
     if found is None:
@@ -127,7 +127,12 @@ def turning_line(recording: Recording, sensor: str) -> FloatArray | None:
     if sensor == "magnetometer":
         turned = turning_axis(*found)
         return None if turned is None or turned[1] < PURE else turned[0]
-    axis = np.mean(found[1], axis=0)
+    rates = found[1]
+    if not plant_of(recording).airborne:
+        rates = rates[np.all(np.isfinite(rates), axis=1)]
+        if len(rates) < FEWEST:
+            return None
+    axis = np.mean(rates, axis=0)
     size = float(np.linalg.norm(axis))
     return np.asarray(axis / size) if np.isfinite(size) and size > 1.0 else None
 
