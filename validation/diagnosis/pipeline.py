@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from discsim.effects.own import UserEffect
-from discsim.effects.sensors import DroppedSamples, Latency
+from discsim.effects.sensors import DroppedSamples
 from discsim.effects.setup import Axes, BoardRotation, TimeOffset
 from discsim.errors import InputError
 from discsim.recording import Recording
@@ -38,9 +38,9 @@ from discsim.validation.diagnosis.selection.stepwise import Anew, search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import (
     free_parameters,
+    with_other_sensor,
     with_reversed_axes,
     with_those_borne_out,
-    with_times_of_another,
     without_faults,
 )
 from discsim.validation.diagnosis.stages import Prepared, Question, Tried
@@ -297,20 +297,16 @@ def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
     return _without(tried, question, TimeOffset) if losing or not _explains(tried) else None
 
 
-def times_of_another(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose that the times of another sensor are off, where fixes would have to be off, too, or more is left.
+def other_sensor(tried: Tried, question: Question) -> SetupFindings | None:
+    """Suppose that another sensor is at fault, where one was as likely before the fit and the fit asks for more.
 
-    Two sensors that are late against each other may each be the one: what moves along with the other tells.
+    Of two sensors that are late against each other either may be the one, and of two that turn the other way: the
+    fixes' times, or what an accelerometer shows of a run-down, tell which.
     """
     found = tried.found
-    if found is None:
+    if found is None or (_explains(tried) and not found.final.hypothesis.candidates):
         return None
-    moved = any(
-        candidate.row.acts_on == "gps" and candidate.row.type in (TimeOffset, Latency)
-        for candidate in found.final.hypothesis.candidates
-    )
-    asked = moved or not _explains(tried)
-    return with_times_of_another(tried.prepared.setup, question.recordings) if asked else None
+    return with_other_sensor(tried.prepared.setup, question.recordings)
 
 
 def axes_as_written(tried: Tried, question: Question) -> SetupFindings | None:
@@ -342,7 +338,7 @@ def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
 #: what is supposed of the setup once effects were searched, one after the other, and the test of whether it stands
 _SUPPOSITIONS = (
     (likeliest_fault, _follows),
-    (times_of_another, _explains_with_less),
+    (other_sensor, _explains_with_less),
     (times_as_written, _explains_all),
     (axes_as_written, _explains_with_less),
     (reversed_axes, _follows_as_well),

@@ -41,9 +41,9 @@ __all__ = [
     "answer_of_setup",
     "free_parameters",
     "on_board_axes",
+    "with_other_sensor",
     "with_reversed_axes",
     "with_those_borne_out",
-    "with_times_of_another",
     "without_faults",
 ]
 
@@ -93,17 +93,18 @@ def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | Non
     return with_axes_of_signs(findings, signs)
 
 
-def with_times_of_another(findings: SetupFindings, written: Sequence[Recording]) -> SetupFindings | None:
-    """Return findings with the times of another sensor at fault, which did as well before the fit; None if none did.
+def with_other_sensor(findings: SetupFindings, written: Sequence[Recording]) -> SetupFindings | None:
+    """Return findings with the first fault that another sensor's would do as well for put down to that sensor.
 
-    ``written`` are the recordings as they stand in their files.
+    None where there is no such fault. ``written`` are the recordings as they stand in their files.
     """
     for fault in findings.faults:
-        others = [twin for twin in fault.twins if (twin.row.type, fault.effect.row.type) == (TimeOffset, TimeOffset)]
+        others = [twin for twin in fault.twins if twin.row.acts_on != fault.effect.row.acts_on]
         if others:
-            other = replace(fault, effect=others[0], twins=(fault.effect,))
-            faults = [other if one is fault else one for one in findings.faults]
-            return replace(findings, faults=tuple(faults), recordings=_as_meant(faults, written))
+            rest = tuple(twin for twin in fault.twins if twin is not others[0])
+            other = replace(fault, effect=others[0], twins=(*rest, fault.effect), place=None)
+            faults = tuple(other if one is fault else one for one in findings.faults)
+            return replace(findings, faults=faults, recordings=_as_meant(faults, written))
     return None
 
 
