@@ -24,7 +24,7 @@ from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import on_the_disc
 from discsim.validation.identification.gauss_newton import Bars, Fit, linearised, merit_of
-from discsim.validation.identification.noise import stated_noise
+from discsim.validation.identification.noise import NoiseModel, stated_noise
 from discsim.validation.identification.plants.flight import FLIGHT
 from discsim.validation.identification.plants.spin_down import SPIN_DOWN
 
@@ -37,6 +37,8 @@ RIGHT = RANKED[6]
 UNASKED = (None, None, None)
 #: readings of the run-downs
 COUNT = 1812
+#: stands for the noise of most readings, in which detectors ask
+STEADY: NoiseModel = {}
 
 
 def step(
@@ -47,6 +49,7 @@ def step(
     hints: Sequence[ScreenedCandidate] = (),
     of_relaxed: Sequence[ScreenedCandidate] = (),
     of_present: Sequence[ScreenedCandidate] = (),
+    shown: Sequence[ScreenedCandidate] = (),
     gaining: bool = True,
     unmodelled: bool = True,
 ) -> tuple[str, list[str], list[float]]:
@@ -54,7 +57,8 @@ def step(
 
     Beside it how much below the present fit's merit each had to come, per reading, or be given up. ``of_relaxed`` are
     candidates as algebra about the relaxed fit has them, and ``of_present`` those about the present one, where they are
-    other than `RANKED`. Unless ``gaining`` none but the right one gains, and the present fit leaves noise alone unless
+    other than `RANKED`; ``shown`` is what detectors show in a noise in which ten times as much is left. Unless
+    ``gaining`` none but the right one gains, and the present fit leaves noise alone unless
     ``unmodelled``.
     """
     recordings = coasts(seconds=1.0)
@@ -78,13 +82,14 @@ def step(
         left = 20.0 if far else 1.1
         for candidate in fitted.hypothesis.candidates:
             left = 1.0 if candidate == right else 0.9 * left
-        return left * fit.count
+        return (left if noise is not STEADY else 10.0 * left) * fit.count
 
     monkeypatch.setattr(searching, "continuous_fit", told)
     monkeypatch.setattr(searching, "chi2_in", chi2)
     monkeypatch.setattr(finding, "chi2_in", chi2)
     monkeypatch.setattr(finding, "normal_equations_of", lambda *_, **__: None)
-    monkeypatch.setattr(searching, "searched", lambda *_: [])
+    monkeypatch.setattr(searching, "searched", lambda *_: list(shown))
+    monkeypatch.setattr(searching, "steady_noise", lambda _: STEADY)
     monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
     ranked = [ScreenedCandidate(candidate, 1e6 - rank, {}) for rank, candidate in enumerate(RANKED)]
     asked = iter([list(of_relaxed) or ranked, list(of_present) or ranked])
@@ -148,6 +153,22 @@ def test_near_the_data_nothing_is_refitted_that_promises_more_than_is_left(monke
     best, refitted, _ = step(monkeypatch, far=False, right=RANKED[1], of_relaxed=absurd)
     assert best == RANKED[1].id
     assert refitted == [candidate.id for candidate in RANKED[:4]]
+
+
+def test_near_the_data_what_a_detector_shows_is_held_against_what_is_left_in_its_own_noise(monkeypatch):
+    """A touch of a free spin of 0.6 rad/s had made the noise of its fit loud: a tenth of the touch was left in that."""
+    touch = CandidateEffect("event.spin_step", (), frozenset({0}))
+    best, refitted, _ = step(
+        monkeypatch, far=False, right=touch, shown=[ScreenedCandidate(touch, 5.0 * COUNT, {})], gaining=False
+    )
+    assert best == touch.id
+    assert refitted[0] == touch.id
+
+
+def test_near_the_data_what_a_detector_shows_beyond_all_that_is_left_in_its_own_noise_is_not_refitted(monkeypatch):
+    touch = CandidateEffect("event.spin_step", (), frozenset({0}))
+    _, refitted, _ = step(monkeypatch, far=False, right=RIGHT, shown=[ScreenedCandidate(touch, 20.0 * COUNT, {})])
+    assert touch.id not in refitted
 
 
 def test_near_the_data_a_limit_at_which_readings_stand_is_refitted_whatever_they_ask_for_beyond_it(monkeypatch):

@@ -20,6 +20,7 @@ from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.commands.import_ import command as import_
 from discsim.validation.diagnosis.setup import SetupFault, find_setup_faults, with_turned_board
+from discsim.validation.diagnosis.setup.spin_signals import turning_line
 from discsim.written import as_written
 
 MAP = ROOT / "models" / "imports" / "csv.toml"
@@ -266,3 +267,44 @@ def test_a_chip_that_is_turned_alone_is_no_turned_board():
 
     assert with_turned_board(find_setup_faults(rows_lost())) is None
     assert with_turned_board(find_setup_faults([tilted(one) for one in rows_lost()])) is None
+
+
+def losing(one: Recording, share: float) -> Recording:
+    """Return a recording whose magnetometer lost a share of its samples and stamped the others evenly."""
+    field = one.samples["magnetometer"]
+    kept = np.random.default_rng(3).random(field.t.size) > share
+    told = Samples(field.t[: int(np.count_nonzero(kept))], field.value[kept])
+    return replace(one, samples={**one.samples, "magnetometer": told})
+
+
+def test_a_turned_board_on_a_rig_is_told_by_its_axis_where_samples_are_lost(sound):
+    """No phase holds then; the axis stands still, and gravity tells which of its ends points down."""
+    fault = effect("board.rotation", rx_rad=-0.8, ry_rad=0.1, rz_rad=1.4)
+    written = [as_written(losing(one, 0.04), [fault]) for one in sound["spin_down"]]
+    before = find_setup_faults(written)
+    assert before.faults == ()
+    findings = with_turned_board(before)
+    assert findings is not None
+    (found,) = findings.faults
+    assert np.array(list(found.effect.sizes.values())) == pytest.approx(np.array([-0.8, 0.1, 1.4]), abs=0.03)
+    assert found.twins == ()
+
+
+@pytest.mark.parametrize("plant", ["spin_down", "rate_table"])
+def test_samples_that_are_lost_on_a_rig_are_no_turned_board(plant, sound):
+    assert with_turned_board(find_setup_faults([losing(one, 0.04) for one in sound[plant]])) is None
+
+
+def test_a_gyroscope_that_clips_on_a_rig_tells_the_axis_while_it_turns_slowly(sound):
+    """Of a mean over readings of which one column stops at its range the other two would have made too much."""
+    one, axis = sound["spin_down"][0], np.array([0.9, 0.24, 0.365])
+    axis /= np.linalg.norm(axis)
+    gyroscope = one.samples["gyroscope"]
+    limit = one.sheets["gyroscope"].range
+    rate = np.linspace(2.0 * limit, 0.0, gyroscope.t.size)
+    clipped = np.clip(rate[:, None] * axis, -limit, limit)
+    assert np.any(clipped == limit)
+    turned = replace(one, samples={**one.samples, "gyroscope": Samples(gyroscope.t, clipped)})
+    line = turning_line(turned, "gyroscope")
+    assert line is not None
+    np.testing.assert_allclose(line, axis, atol=1e-9)

@@ -15,6 +15,7 @@ from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_axes_of_signs
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
 from discsim.validation.diagnosis.setup.told_by_fit import with_fault_that_follows
+from discsim.validation.diagnosis.setup_effects import with_other_sensor
 from discsim.written import as_written
 
 #: rad/s: an ordinary gyroscope's 2000 deg/s, which a thrown disc turns faster than
@@ -110,3 +111,28 @@ def test_axes_that_a_rig_cannot_tell_stand_beside_those_that_a_fit_has_found():
     (named,) = findings.faults
     assert named.effect == effect("gyro.axes", axes="x y -z")
     assert fault in named.twins
+
+
+def test_without_a_magnetometer_relations_do_not_see_late_times_and_a_flight_does(flights):
+    written = [as_written(one, [effect("accel.time_offset", offset_s=0.031)]) for one in flights]
+    before = find_setup_faults(written)
+    assert before.faults == ()
+    findings = with_fault_that_follows(before, ["gyroscope"])
+    assert findings is not None
+    (fault,) = findings.faults
+    # the two are 31 ms apart, and either may be off: the path tells which, over a whole flight
+    either = {one.id: float(one.value[0]) for one in (fault.effect, *fault.twins)}
+    assert either == pytest.approx({"accel.time_offset": 0.031, "gyro.time_offset": -0.031}, abs=1e-3)
+    other = with_other_sensor(findings, written)
+    assert other is not None
+    assert {one.id for one in other.effects} == set(either) - {fault.id}
+    for one, sound in zip((other if fault.id == "gyro.time_offset" else findings).recordings, flights, strict=True):
+        shift = one.samples["accelerometer"].t - sound.samples["accelerometer"].t
+        assert np.abs(shift).max() < 1e-3
+
+
+def test_a_fault_that_no_other_sensor_would_do_for_is_not_put_down_to_one(flights):
+    written = [as_written(one, [effect("gyro.axes", axes="-x -y -z")]) for one in flights]
+    findings = with_fault_that_follows(find_setup_faults(written), ["gyroscope"])
+    assert findings is not None
+    assert with_other_sensor(findings, written) is None
