@@ -30,7 +30,8 @@ from discsim.validation.diagnosis.result import (
     Verdict,
 )
 from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said, with_axes_of_signs
+from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said, with_axes_as_read
+from discsim.validation.diagnosis.setup.hypotheses import PERMUTATIONS, SNAP
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.other_side import at_limits
 from discsim.validation.identification.parameters import Parameter
@@ -52,12 +53,6 @@ __all__ = [
 _SIGMA: Mapping[type[Any], float] = {TimeOffset: 0.01, BoardRotation: 0.2, SiteField: 0.2}
 #: a number whose error is this share of that was not determined by the recordings
 _UNDETERMINED = 0.3
-#: the numbers of a fit that are -2 where an axis reads -1 times what it should, by sensor
-_AXES_OF: Mapping[str, tuple[tuple[type[Any], str], ...]] = {
-    "accelerometer": tuple((Scale, name) for name in Scale._fields),
-    "gyroscope": tuple((Scale, name) for name in Scale._fields),
-    "magnetometer": tuple((SoftIron, name) for name in ("sxx", "syy", "szz")),
-}
 #: scale error beyond which an axis reads rather -1 times what it should than nothing
 _REVERSED = -1.5
 
@@ -75,22 +70,38 @@ def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
 def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | None:
     """Return findings with the axes that a fit has found to read about -1 times what they should; None if it has none.
 
-    A scale error of -2 is a reversed column, and so is an axis of a magnetometer at which soft iron takes twice what is
-    there, or one whose readings at a limit stand at the other one. Where the axis hardly shows, as one along which a
-    sensor lies near the spin axis, relations between sensors do not tell it before the fit.
+    A scale error of -2 is a reversed column, and so is one whose readings at a limit stand at the other one. Soft iron
+    that makes one axis another, or its reverse, is that. Where an axis hardly shows, as one along which a sensor lies
+    near the spin axis, relations between sensors do not tell it before the fit.
     """
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     at = {(q.group, q.name): v + 3.0 * e for q, v, e in zip(fit.parameters, fit.at, sd, strict=True)}
     limits = at_limits(fit)
-    signs = {}
-    for sensor, names in _AXES_OF.items():
-        back = [at.get((catalogued(kind, sensor).id, name), 0.0) < _REVERSED for kind, name in names]
+    reads = {}
+    for sensor in ("accelerometer", "gyroscope"):
+        back = [at.get((catalogued(Scale, sensor).id, name), 0.0) < _REVERSED for name in Scale._fields]
         beyond = [(sensor, axis) in limits and limits[sensor, axis].reversed for axis in range(3)]
         # a fit with a scale of -1 has what stands at a limit on the right side
-        signs[sensor] = np.where(np.logical_or(back, beyond), -1.0, 1.0)
-    if all(np.all(own > 0.0) for own in signs.values()):
+        reads[sensor] = np.diag(np.where(np.logical_or(back, beyond), -1.0, 1.0))
+    reads["magnetometer"] = _read_by_iron(fit)
+    if all(np.array_equal(own, np.eye(3)) for own in reads.values()):
         return None
-    return with_axes_of_signs(findings, signs)
+    return with_axes_as_read(findings, reads)
+
+
+def _read_by_iron(fit: Fit) -> FloatArray:
+    """Return the signed permutation (3, 3) of axes that a magnetometer's soft iron stands for; none for iron."""
+    values = fit.values(0)
+    softens = SoftIron(*(values.get((catalogued(SoftIron).id, name), 0.0) for name in SoftIron._fields))
+    matrix = np.eye(3) + np.array(
+        [
+            [softens.sxx, softens.sxy, softens.sxz],
+            [softens.sxy, softens.syy, softens.syz],
+            [softens.sxz, softens.syz, softens.szz],
+        ]
+    )
+    nearest = min(PERMUTATIONS, key=lambda one: float(np.linalg.norm(matrix - one)))
+    return nearest if np.linalg.norm(matrix - nearest) < SNAP else np.eye(3)
 
 
 def with_other_sensor(findings: SetupFindings, written: Sequence[Recording]) -> SetupFindings | None:

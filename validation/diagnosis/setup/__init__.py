@@ -8,7 +8,7 @@ from discsim.validation.diagnosis.setup.find import (
     with_likeliest_fault,
     with_turned_board,
 )
-from discsim.validation.diagnosis.setup.told_by_fit import with_axes_of_signs
+from discsim.validation.diagnosis.setup.told_by_fit import with_axes_as_read
 
 __all__ = [
     "SetupFault",
@@ -17,7 +17,7 @@ __all__ = [
     "said",
     "setup_notes",
     "suspected_fault",
-    "with_axes_of_signs",
+    "with_axes_as_read",
     "with_fault",
     "with_likeliest_fault",
     "with_turned_board",

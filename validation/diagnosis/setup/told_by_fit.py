@@ -24,7 +24,7 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import plant_of
 from discsim.written import corrected
 
-__all__ = ["with_axes_of_signs", "with_fault_that_follows"]
+__all__ = ["with_axes_as_read", "with_fault_that_follows"]
 
 #: what follows leaves less than this many times the best: a merit per reading of a thousand readings scatters by
 #: sqrt(2 / 1000), of which this is two
@@ -97,19 +97,20 @@ def _with(findings: SetupFindings, effect: Effect, twins: Sequence[Effect]) -> S
     return SetupFindings(tuple(with_fault(findings.faults, fault)), current, findings.hints)
 
 
-def with_axes_of_signs(findings: SetupFindings, signs: Mapping[str, FloatArray]) -> SetupFindings:
-    """Return findings with the axes of sensors that a fit has found to read -1 times what they should.
+def with_axes_as_read(findings: SetupFindings, reads: Mapping[str, FloatArray]) -> SetupFindings:
+    """Return findings with the axes of sensors that a fit has found to read other axes than they should.
 
-    ``signs`` (3,) are by sensor. A disc is round: what turns all sensors of the board by half a turn about its axis is
-    no other setup, and of the two the one is told in which fewer sensors are at fault.
+    ``reads`` (3, 3) are by sensor the signed permutations that take true axes to columns. A disc is round: what turns
+    all sensors of the board by half a turn about its axis is no other setup, and of the two the one is told in which
+    fewer sensors are at fault.
     """
-    board = {name: signs.get(name, np.ones(3)) for name in BOARD if any(name in one for one in findings.recordings)}
-    half = np.array([-1.0, -1.0, 1.0])
-    turned = {name: own * half for name, own in board.items()}
-    fewest = min((board, turned), key=lambda one: sum(bool(np.any(own < 0.0)) for own in one.values()))
+    board = {name: reads.get(name, np.eye(3)) for name in BOARD if any(name in one for one in findings.recordings)}
+    half = np.diag([-1.0, -1.0, 1.0])
+    turned = {name: own @ half for name, own in board.items()}
+    fewest = min((board, turned), key=lambda one: sum(not np.array_equal(own, np.eye(3)) for own in one.values()))
     for sensor, own in fewest.items():
-        if np.any(own < 0.0):
-            effect = effect_of(Axes(axes_of(np.diag(own))), sensor)
+        if not np.array_equal(own, np.eye(3)):
+            effect = effect_of(Axes(axes_of(own)), sensor)
             findings = _with(findings, effect, _twins(findings.recordings, effect))
     return findings
 

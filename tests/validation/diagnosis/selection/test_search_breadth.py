@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -41,23 +42,30 @@ COUNT = 1812
 STEADY: NoiseModel = {}
 
 
+class Promised(NamedTuple):
+    """Candidates as algebra about the relaxed fit, and about the present one, has them, where other than `RANKED`.
+
+    ``shown`` is what detectors show in a noise in which ten times as much is left.
+    """
+
+    of_relaxed: Sequence[ScreenedCandidate] = ()
+    of_present: Sequence[ScreenedCandidate] = ()
+    shown: Sequence[ScreenedCandidate] = ()
+
+
 def step(
     monkeypatch: pytest.MonkeyPatch,
     *,
     far: bool,
     right: CandidateEffect,
     hints: Sequence[ScreenedCandidate] = (),
-    of_relaxed: Sequence[ScreenedCandidate] = (),
-    of_present: Sequence[ScreenedCandidate] = (),
-    shown: Sequence[ScreenedCandidate] = (),
+    promised: Promised = Promised(),  # noqa: B008 - frozen
     gaining: bool = True,
     unmodelled: bool = True,
 ) -> tuple[str, list[str], list[float]]:
     """Return what one step of the search adds, and what it refitted, where fits are not made but told.
 
-    Beside it how much below the present fit's merit each had to come, per reading, or be given up. ``of_relaxed`` are
-    candidates as algebra about the relaxed fit has them, and ``of_present`` those about the present one, where they are
-    other than `RANKED`; ``shown`` is what detectors show in a noise in which ten times as much is left. Unless
+    Beside it how much below the present fit's merit each had to come, per reading, or be given up. Unless
     ``gaining`` none but the right one gains, and the present fit leaves noise alone unless
     ``unmodelled``.
     """
@@ -88,11 +96,11 @@ def step(
     monkeypatch.setattr(searching, "chi2_in", chi2)
     monkeypatch.setattr(finding, "chi2_in", chi2)
     monkeypatch.setattr(finding, "normal_equations_of", lambda *_, **__: None)
-    monkeypatch.setattr(searching, "searched", lambda *_: list(shown))
+    monkeypatch.setattr(searching, "searched", lambda *_: list(promised.shown))
     monkeypatch.setattr(searching, "steady_noise", lambda _: STEADY)
     monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
     ranked = [ScreenedCandidate(candidate, 1e6 - rank, {}) for rank, candidate in enumerate(RANKED)]
-    asked = iter([list(of_relaxed) or ranked, list(of_present) or ranked])
+    asked = iter([list(promised.of_relaxed) or ranked, list(promised.of_present) or ranked])
     monkeypatch.setattr(searching, "one_per_effect", lambda _: next(asked))
     found = finding.Search(
         tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, *UNASKED, hints=tuple(hints)
@@ -141,7 +149,7 @@ def test_near_the_data_what_the_present_fit_asks_for_is_not_kept_waiting_by_what
     for gaining in (True, False):
         with pytest.MonkeyPatch.context() as patched:
             best, refitted, _ = step(
-                patched, far=False, right=RIGHT, of_relaxed=promised, of_present=found, gaining=gaining
+                patched, far=False, right=RIGHT, promised=Promised(promised, found), gaining=gaining
             )
         assert best == RIGHT.id
         assert refitted[:2] == [RANKED[7].id, RIGHT.id]
@@ -150,7 +158,7 @@ def test_near_the_data_what_the_present_fit_asks_for_is_not_kept_waiting_by_what
 def test_near_the_data_nothing_is_refitted_that_promises_more_than_is_left(monkeypatch):
     """Segments that one recording has wrong had promised a million; fixes that came late were not among the first."""
     absurd = [ScreenedCandidate(candidate, 1e7 - rank, {}) for rank, candidate in enumerate(RANKED[7:11])]
-    best, refitted, _ = step(monkeypatch, far=False, right=RANKED[1], of_relaxed=absurd)
+    best, refitted, _ = step(monkeypatch, far=False, right=RANKED[1], promised=Promised(absurd))
     assert best == RANKED[1].id
     assert refitted == [candidate.id for candidate in RANKED[:4]]
 
@@ -159,7 +167,11 @@ def test_near_the_data_what_a_detector_shows_is_held_against_what_is_left_in_its
     """A touch of a free spin of 0.6 rad/s had made the noise of its fit loud: a tenth of the touch was left in that."""
     touch = CandidateEffect("event.spin_step", (), frozenset({0}))
     best, refitted, _ = step(
-        monkeypatch, far=False, right=touch, shown=[ScreenedCandidate(touch, 5.0 * COUNT, {})], gaining=False
+        monkeypatch,
+        far=False,
+        right=touch,
+        promised=Promised(shown=[ScreenedCandidate(touch, 5.0 * COUNT, {})]),
+        gaining=False,
     )
     assert best == touch.id
     assert refitted[0] == touch.id
@@ -167,14 +179,16 @@ def test_near_the_data_what_a_detector_shows_is_held_against_what_is_left_in_its
 
 def test_near_the_data_what_a_detector_shows_beyond_all_that_is_left_in_its_own_noise_is_not_refitted(monkeypatch):
     touch = CandidateEffect("event.spin_step", (), frozenset({0}))
-    _, refitted, _ = step(monkeypatch, far=False, right=RIGHT, shown=[ScreenedCandidate(touch, 20.0 * COUNT, {})])
+    _, refitted, _ = step(
+        monkeypatch, far=False, right=RIGHT, promised=Promised(shown=[ScreenedCandidate(touch, 20.0 * COUNT, {})])
+    )
     assert touch.id not in refitted
 
 
 def test_near_the_data_a_limit_at_which_readings_stand_is_refitted_whatever_they_ask_for_beyond_it(monkeypatch):
     """Clipped readings are no part of what is left: with a gain of 5e8 a limit of 30 m/s^2 was dropped, and missed."""
     limit = CandidateEffect("accel.saturation", (), None, (("limit_m_s2", 30.32, 0.0014),))
-    best, _, _ = step(monkeypatch, far=False, right=limit, of_relaxed=[ScreenedCandidate(limit, 5e8, {})])
+    best, _, _ = step(monkeypatch, far=False, right=limit, promised=Promised([ScreenedCandidate(limit, 5e8, {})]))
     assert best == limit.id
 
 

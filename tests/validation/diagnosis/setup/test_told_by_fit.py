@@ -12,7 +12,7 @@ from discsim.recording import Recording, Samples
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_axes_of_signs
+from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_axes_as_read
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
 from discsim.validation.diagnosis.setup.told_by_fit import with_fault_that_follows
 from discsim.validation.diagnosis.setup_effects import with_other_sensor
@@ -91,11 +91,11 @@ def test_a_column_that_stands_at_the_other_limit_throughout_is_named(flights):
 def test_of_two_setups_that_are_one_half_turn_apart_the_one_with_fewer_faults_is_told(flights):
     case = draw_case(0, "flight", kind="nothing")
     one = recordings(replace(case, runs=case.runs[:1], stated_releases=case.stated_releases[:1], longest=2.0))[0]
-    signs = {"gyroscope": np.array([-1.0, -1.0, 1.0]), "magnetometer": np.array([1.0, 1.0, -1.0])}
+    signs = {"gyroscope": np.diag([-1.0, -1.0, 1.0]), "magnetometer": np.diag([1.0, 1.0, -1.0])}
     alone = SetupFindings((), (without(one, "accelerometer"),))
-    assert meant(with_axes_of_signs(alone, signs)) == (effect("mag.axes", axes="-x -y -z"),)
+    assert meant(with_axes_as_read(alone, signs)) == (effect("mag.axes", axes="-x -y -z"),)
     # an accelerometer that shows which way x points has the gyroscope's columns wrong, too
-    assert {fault.id for fault in meant(with_axes_of_signs(SetupFindings((), (one,)), signs))} == {
+    assert {fault.id for fault in meant(with_axes_as_read(SetupFindings((), (one,)), signs))} == {
         "mag.axes",
         "gyro.axes",
     }
@@ -105,8 +105,8 @@ def test_axes_that_a_rig_cannot_tell_stand_beside_those_that_a_fit_has_found():
     case = draw_case(0, "spin_down", kind="nothing")
     one = recordings(replace(case, runs=case.runs[:1]))[0]
     fault = effect("gyro.axes", axes="-x -y -z")
-    findings = with_axes_of_signs(
-        SetupFindings((), (as_written(one, [fault]),)), {"gyroscope": np.array([1.0, 1.0, -1.0])}
+    findings = with_axes_as_read(
+        SetupFindings((), (as_written(one, [fault]),)), {"gyroscope": np.diag([1.0, 1.0, -1.0])}
     )
     (named,) = findings.faults
     assert named.effect == effect("gyro.axes", axes="x y -z")
