@@ -252,7 +252,7 @@ def _follows(tried: Tried, before: Tried) -> bool:
 
 def _follows_as_well(tried: Tried, before: Tried) -> bool:
     """Tell whether sensors do not contradict one another, and no more than noise is left if nothing more was before."""
-    return tried.contradiction is None and (_explains(tried) or not _explains(before))
+    return _follows(tried, before) and (_explains(tried) or not _explains(before))
 
 
 def _explains(tried: Tried) -> bool:

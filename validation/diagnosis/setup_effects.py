@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, row
 from discsim.effects.kind import BOARD
-from discsim.effects.sensors import Scale, SoftIron
+from discsim.effects.sensors import Scale, SoftIron, soft_iron
 from discsim.effects.setup import BoardRotation, ClockUnit, SiteField, TimeOffset
 from discsim.recording import Recording
 from discsim.validation.diagnosis.result import (
@@ -92,14 +92,8 @@ def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | Non
 def _read_by_iron(fit: Fit) -> FloatArray:
     """Return the signed permutation (3, 3) of axes that a magnetometer's soft iron stands for; none for iron."""
     values = fit.values(0)
-    softens = SoftIron(*(values.get((catalogued(SoftIron).id, name), 0.0) for name in SoftIron._fields))
-    matrix = np.eye(3) + np.array(
-        [
-            [softens.sxx, softens.sxy, softens.sxz],
-            [softens.sxy, softens.syy, softens.syz],
-            [softens.sxz, softens.syz, softens.szz],
-        ]
-    )
+    iron = SoftIron(*(values.get((catalogued(SoftIron).id, name), 0.0) for name in SoftIron._fields))
+    matrix = soft_iron(iron, np.eye(3))
     nearest = min(PERMUTATIONS, key=lambda one: float(np.linalg.norm(matrix - one)))
     return nearest if np.linalg.norm(matrix - nearest) < SNAP else np.eye(3)
 

@@ -201,11 +201,9 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
         # no more can be gained than is left, each in the noise in which it was asked: about segments that one recording
         # has wrong algebra promises anything. A limit at which readings stand moves nothing in a fit, and these
         # readings are no part of what is left
-        asked = ((there, found.relaxed_noise), (shown, steady))
-        left = (chi2_in(current, noise) for _, noise in asked)
-        there, shown = (
-            [offer for offer in some if in_chi2(offer) < most] for (some, _), most in zip(asked, left, strict=True)
-        )
+        left, left_steady = (chi2_in(current, noise) for noise in (found.relaxed_noise, steady))
+        there = [offer for offer in there if in_chi2(offer) < left]
+        shown = [offer for offer in shown if in_chi2(offer) < left_steady]
     # what the two promise does not compare: far from the data they are asked in different noise, and near them the
     # segments of a fit that follows may promise much of a sensor that has nothing to gain
     there, shown, here = (

@@ -33,12 +33,14 @@ def begun_as_tried(offers: Sequence[Offer], tried: Sequence[Offer]) -> list[Offe
     A linear question is right about small sizes: of an offset over the corners of a ramp it tells a part, and a fit
     that begins there may end there.
     """
-    sizes = {(_effect(one), frozenset(one[0].start)): one for one in reversed(tried)}
-    return [sizes.get((_effect(one), frozenset(one[0].start)), one) for one in offers]
+    sizes = {_numbers(one): one for one in reversed(tried)}
+    return [sizes.get(_numbers(one), one) for one in offers]
 
 
-def _effect(offer: Offer) -> tuple[str, frozenset[int] | None]:
-    return offer[0].candidate.id, offer[0].candidate.recordings
+def _numbers(offer: Offer) -> tuple[object, ...]:
+    """Return what two offers of the same numbers have in common: the effect, its recordings, what has a start."""
+    screened = offer[0]
+    return screened.candidate.id, screened.candidate.recordings, frozenset(screened.start)
 
 
 def in_chi2(offer: Offer) -> float:
