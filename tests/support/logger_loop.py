@@ -73,6 +73,16 @@ def logged(
     return replace(recording, samples=samples), np.rint((sampled(kept) - phase) / PERIOD).astype(int)
 
 
+def chip_times(seed: int, chip: float) -> np.ndarray:
+    """Return when a chip of a period made what each row shows that `logged` writes with it, s."""
+    rng = np.random.default_rng(seed)
+    steps = np.arange(2, int(1.9 / LOOP))
+    kept = steps[rng.random(steps.size) > 0.2]
+    rng.uniform(0.0, PERIOD)
+    began = rng.uniform(0.0, chip)
+    return np.asarray(began + chip * np.floor((kept * LOOP - began) / chip))
+
+
 def ages(seed: int) -> np.ndarray:
     """Return how old the newest sample of the field is in each row that `logged` writes in step with the loop, s."""
     rng = np.random.default_rng(seed)

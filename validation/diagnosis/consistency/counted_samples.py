@@ -47,6 +47,8 @@ _AHEAD = np.array([0.0, 0.6, 0.28, 0.08, 0.02, 0.01, 0.005, 0.003, 0.002])
 _SKIPPED = 0.07
 #: the same of a row whose logger loses none: it shows the sample of the row before, the next, or the one after that
 _KEPT = np.array([0.1, 0.75, 0.15])
+#: a row this many robust scales off the motion is no reading of any sample: normal noise makes none in 1e9 rows
+_DOUBTFUL = 6.0
 #: twice the log likelihood that means of two samples, or a finer tick, must gain beyond their pattern's price
 PRICE = 24.0
 
@@ -209,6 +211,11 @@ class Counted:
     scale: float
     period: float
 
+    @property
+    def doubtful(self) -> tuple[int, ...]:
+        """Rows that no sample makes read as they do."""
+        return tuple(np.flatnonzero(np.abs(self.left) > _DOUBTFUL * self.scale).tolist())
+
 
 def _first_samples(
     field: Field, centre: complex, period: float, *, means: bool, kept: bool = False
@@ -328,7 +335,8 @@ def field_of(recording: Recording) -> Field | None:
 def unslipped(field: Field, found: Counted, period: float, *, means: bool, kept: bool) -> Counted:
     """Return the samples of rows that were miscounted somewhere: all later ones are a sample off, which bends a motion.
 
-    Where most is left, what comes after is counted one more or one less; the best of these is gone on from.
+    Where most is left, and at rows that no sample makes read as they do, what comes after is counted one more or one
+    less; the best of these is gone on from.
     """
 
     def again(newest: IntArray, apart: IntArray, rounds: int = _ROUNDS) -> Counted:
@@ -343,8 +351,10 @@ def unslipped(field: Field, found: Counted, period: float, *, means: bool, kept:
             k = int(np.argmax(block))
             block[max(k - _BLOCK, 0) : k + _BLOCK] = 0.0
             places += [k - _BLOCK // 2, k, k + _BLOCK // 2]
+        for k in found.doubtful:
+            places += [k, k + 1]
         tried = []
-        for k in np.clip(places, 1, found.newest.size - 1):
+        for k in sorted(set(np.clip(places, 1, found.newest.size - 1).tolist())):
             for more in (-1, 1):
                 newest = found.newest.copy()
                 newest[k:] += more

@@ -27,11 +27,18 @@ from discsim.validation.diagnosis.consistency.late_rows import (
     Windows,
     asked_within,
     late_all_along,
+    late_needed,
     late_rows_of,
     rows_decided,
 )
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, SamplesShown
-from discsim.validation.diagnosis.consistency.phase_regression import retimed, signal_of, slow_columns
+from discsim.validation.diagnosis.consistency.phase_regression import (
+    retimed,
+    signal_of,
+    slow_columns,
+    slow_count,
+    slow_sum,
+)
 
 __all__ = ["ImuClock", "ImuRows", "imu_clock_of"]
 
@@ -50,6 +57,11 @@ _STARTS, _PHASES = (0.2, 0.4, 0.6, 0.8), 4
 #: twice the log likelihood that a recording must gain beyond what its choices cost, as for the samples of the field,
 #: and that all must gain beyond what a comb gains whose period is another by more than the next number
 _PRICE, _ANOTHER = 24.0, 0.02
+#: times that all rows may be off by, of a period, the nearest first: a wobble that turns by 0.5 rad in a period turns
+#: by 0.05 from one to the next, a twentieth of its size
+_SHIFTS = np.array(sorted(np.linspace(-0.5, 0.5, 11), key=abs))
+#: two parts tell one tick where the shorter is at least this share of the longer: each is the least that does
+_ONE_TICK = 0.5
 #: what chooses one of two teeth costs, in twice the log likelihood
 _CHOICE = 2.0 * float(np.log(2.0))
 #: a comb this near to the logger's loop is the loop itself: the chip is read as it is sampled
@@ -174,6 +186,17 @@ class _Wobble:
         slow = slow_columns(t - start, end - start, _SLOW_S)
         return np.hstack([fast, slow, np.exp(-1j * psi)[:, None] * slow]), fast.shape[1]
 
+    def reads(self, t: FloatArray, x: ComplexArray) -> ComplexArray:
+        """Return what the columns with coefficients (p,) are at times of any shape."""
+        start, end = self.asked[0] - 2.0 * self.within, self.asked[-1] + 2.0 * self.within
+        psi = self.turned(t) - self.turned(0.0)
+        fast, still, carried = np.split(x, np.cumsum([slow_count(end - start, knots) for knots in (_KNOTS_S, _SLOW_S)]))
+        return np.asarray(
+            np.exp(1j * self.order * psi) * slow_sum(t - start, end - start, _KNOTS_S, fast)
+            + slow_sum(t - start, end - start, _SLOW_S, still)
+            + np.exp(-1j * psi) * slow_sum(t - start, end - start, _SLOW_S, carried)
+        )
+
 
 def _wobble_of(recording: Recording, shown: SamplesShown, period: float) -> _Wobble | None:
     """Return the wobble of a recording at the samples of the field that its rows show, None where none is told.
@@ -229,21 +252,32 @@ def _strength(told: FloatArray, weight: FloatArray, periods: FloatArray) -> Floa
 
 
 def _on_teeth(wobble: _Wobble, fitted: _Fitted, period: float) -> FloatArray:
-    """Return the tooth (n,), of those that a row may show, at which the wobble is most as it reads."""
+    """Return the tooth (n,), of those that a row may show, at which the wobble is most as it reads.
+
+    But for one time that all are off by, which the wobble's phase makes up for: taken is the one, of some in a period
+    about none, that has most rows read as they do within the samples that they may show.
+    """
     middle = np.sum(fitted.weight * np.exp(2j * np.pi * fitted.told / period))
     phase = float(np.angle(middle)) / (2.0 * np.pi) * period
     first = phase + period * np.floor((wobble.asked - phase) / period)
-    teeth = np.stack([first + k * period for k in (-1, 0, 1)])
-    reads = (wobble.columns(teeth.ravel())[0] @ fitted.x).reshape(teeth.shape)
-    off = np.abs(wobble.value - reads) ** 2
-    # the newest sample is at most a period older than the instant of asking, which is within one of the field's
-    off[(teeth <= wobble.asked - period) | (teeth >= wobble.asked + wobble.within)] = np.inf
-    return _in_order(teeth, off)
+    teeth = np.stack([first + k * period for k in (-2, -1, 0, 1, 2)])
+    off = np.abs(wobble.value - wobble.reads(teeth, fitted.x)) ** 2
+    best, least = first, np.inf
+    for shift in _SHIFTS * period:
+        # the newest sample is at most a period older than the instant of asking, which is within one of the field's
+        late = teeth + shift - wobble.asked
+        chosen, total = _in_order(teeth, np.where((late > -period) & (late < wobble.within), off, np.inf))
+        if total < least:
+            best, least = chosen + shift, total
+    return best
 
 
 @compiled
-def _in_order(teeth: FloatArray, off: FloatArray) -> FloatArray:
-    """Return for each row the one of its teeth (k, n) that together cost least, none before the row ahead of it."""
+def _in_order(teeth: FloatArray, off: FloatArray) -> tuple[FloatArray, float]:
+    """Return for each row the one of its teeth (k, n) that together cost least, none before the row ahead of it.
+
+    And what they cost.
+    """
     kinds, rows = off.shape
     total = off[:, 0].copy()
     before = np.zeros((kinds, rows), np.int64)
@@ -258,10 +292,11 @@ def _in_order(teeth: FloatArray, off: FloatArray) -> FloatArray:
         total = reached + off[:, i]
     chosen = np.empty(rows)
     k = int(np.argmin(total))
+    least = total[k]
     for i in range(rows - 1, -1, -1):
         chosen[i] = teeth[k, i]
         k = before[k, i]
-    return chosen
+    return chosen, least
 
 
 @dataclass(frozen=True)
@@ -357,7 +392,8 @@ def _own_comb(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | Non
             best = _from_all_phases(wobble, first[name], periods[np.abs(periods / told - 1.0) <= _ALIKE])
         if best.gain < _PRICE:
             return None
-        found.append(ImuRows(name, best.period, wobble.written, best.times, (first[name].rms, best.rms), best.gain))
+        times = _amid(wobble, best.times, best.period)
+        found.append(ImuRows(name, best.period, wobble.written, times, (first[name].rms, best.rms), best.gain))
     own = np.array([one.period_s for one in found])
     loops = [one.loop_s for one in clock.shown if one.loop_s is not None]
     period = float(np.mean(own))
@@ -365,6 +401,16 @@ def _own_comb(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | Non
     if same:
         found = [_asked_between(one, wobbles[one.recording]) for one in found]
     return ImuClock(period, float(np.std(own, ddof=1) / np.sqrt(own.size)), tuple(found), same)
+
+
+def _amid(wobble: _Wobble, times: FloatArray, period: float) -> FloatArray:
+    """Return rows' times (n,) with the one time that all are off by, which puts them amid what they may be.
+
+    A wobble's phase tells that time roughly or not at all: each sample is the newest of its part, which tells more.
+    """
+    late = times - wobble.asked
+    room = np.array([-period - np.min(late), wobble.within - np.max(late)])
+    return np.asarray(times + np.mean(room))
 
 
 def _asked_between(rows: ImuRows, wobble: _Wobble) -> ImuRows:
@@ -466,15 +512,23 @@ def _beside_a_late_loop(wobbles: Mapping[str, _Wobble], comb: ImuClock) -> ImuCl
     if begun is None or not begun[0]:
         return comb
     tick, loops = begun
-    due = {name: loops[name].instants(own.step) for name, own in field.items()}
-    more = late_all_along(due, tick, chip)
     told, ticks = {}, []
     for name, own in field.items():
-        by_chip = rows_decided(due[name], tick, chip[name].made + more, chip[name].period_s)
-        told[name] = (rows_decided(due[name], tick, own.made, own.period_s), by_chip)
+        due = loops[name].instants(own.step)
+        # a wobble's phase leaves open one time that the rows of a recording are all off by
+        made = chip[name].made + late_all_along(due, tick, chip[name])
+        by_chip = rows_decided(due, tick, made, chip[name].period_s)
+        told[name] = (rows_decided(due, tick, own.made, own.period_s), by_chip)
         alone = asked_within({name: own})
         ticks.append(tick if alone is None else alone[0])
-    found = late_rows_of(np.array(ticks), told)
+    # which rows were late the field tells best: where the chip's windows lie a wobble leaves open
+    found = late_rows_of(np.array(ticks), {name: (by_field, by_field) for name, (by_field, _) in told.items()})
+    agreed = late_rows_of(np.array(ticks), told).agreed
+    # of short ticks few rows are decided by both; that each by itself asks for late rows, and for one tick, tells more
+    needed = [late_needed(one) for one in (field, chip)]
+    if agreed > 0.0 and min(needed)[0] > _ONE_TICK * max(needed)[0]:
+        agreed = max(agreed, min(gain for _, gain in needed))
     # so few rows that were late are near the end of their windows
     near = MISCOUNTED * comb.period_s / max(found.fraction, MISCOUNTED)
-    return replace(comb, late=replace(found, tick_s=tick, tick_sd_s=float(np.hypot(found.tick_sd_s, near))))
+    tick_sd = float(np.hypot(found.tick_sd_s, near))
+    return replace(comb, late=replace(found, tick_s=tick, tick_sd_s=tick_sd, agreed=agreed))

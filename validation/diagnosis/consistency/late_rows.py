@@ -26,6 +26,7 @@ __all__ = [
     "Windows",
     "asked_within",
     "late_all_along",
+    "late_needed",
     "late_rows_of",
     "rows_decided",
 ]
@@ -111,23 +112,41 @@ def asked_within(windows: Mapping[str, Windows]) -> tuple[float, dict[str, Loop]
     return float(best.x[0]), loops
 
 
-def late_all_along(due: Mapping[str, FloatArray], tick: float, windows: Mapping[str, Windows]) -> float:
+def late_all_along(due: FloatArray, tick: float, own: Windows) -> float:
     """Return by how much a part's samples were made later, s, so that as few rows as can be are outside their windows.
 
-    Its times are known but for one time that all are off by. ``due`` are when each recording's rows were due, s.
+    Its times are known but for one time that all of a recording are off by. ``due`` (n,) is when rows were due, s.
     """
-    period = max(one.period_s for one in windows.values())
-    tried = np.linspace(-period, period, _TRIED)
 
     def outside(more: float) -> float:
-        total = 0.0
-        for name, own in windows.items():
-            made = own.made + more
-            total += float(np.sum(np.maximum(made - due[name] - tick, 0.0)))
-            total += float(np.sum(np.maximum(due[name] - made - own.period_s, 0.0)))
-        return total
+        made = own.made + more
+        late, early = made - due - tick, due - made - own.period_s
+        return float(np.sum(np.maximum(late, 0.0)) + np.sum(np.maximum(early, 0.0)))
 
-    return float(min(tried, key=outside))
+    return float(min(np.linspace(-own.period_s, own.period_s, _TRIED), key=outside))
+
+
+def late_needed(windows: Mapping[str, Windows]) -> tuple[float, float]:
+    """Return the tick, s, by which a part's own windows say that rows came late, and what they gain by it.
+
+    In twice the log likelihood, against a loop whose rows all came as late as suits most of them: a row is outside its
+    window once in a hundred, late with the share of the rows that are decided, and free where its window holds both.
+    """
+    begun = asked_within(windows)
+    if begun is None or not begun[0]:
+        return 0.0, 0.0
+    tick, loops = begun
+    first, last, counts = [], [], np.zeros(2)
+    for name, own in windows.items():
+        due = loops[name].instants(own.step)
+        counts += [np.count_nonzero(one) for one in rows_decided(due, tick, own.made, own.period_s)]
+        first.append(own.made - due)
+        last.append(own.made + own.period_s - due)
+    begin, end = np.concatenate(first), np.concatenate(last)
+    outside = int(np.count_nonzero((begin > tick) | (end < 0.0)))
+    alike = min(int(np.count_nonzero((begin > more) | (end < more))) for more in np.linspace(0.0, tick, _TRIED))
+    told = float(np.sum(xlogy(counts, counts / max(float(np.sum(counts)), 1.0))))
+    return tick, 2.0 * (told + (outside - alike) * float(np.log(MISCOUNTED)))
 
 
 def rows_decided(due: FloatArray, tick: float, made: FloatArray, period: float) -> tuple[BoolArray, BoolArray]:

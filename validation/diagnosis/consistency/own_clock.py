@@ -41,8 +41,6 @@ __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
 _SLIPPED = 1.3
 #: by how much the times of rows that show the same sample run on, s
 _RUNS_ON = 1e-9
-#: a row this many robust scales off the motion is no reading of any sample: normal noise makes none in 1e9 rows
-_DOUBTFUL = 6.0
 #: how long before the first row a motion begins, in periods: half a mean, and a part that is late by as much
 _ROOM = 1.5
 #: the field must turn by this many standard deviations of a reading's phase from sample to sample
@@ -278,7 +276,9 @@ def _clock(
     least = min(rms(one.left) for one in counted.values())
     middle = float(np.median([one.period for one in counted.values()]))
     counted = {
-        name: unslipped(fields[name], one, middle, means=means, kept=kept) if rms(one.left) > _SLIPPED * least else one
+        name: unslipped(fields[name], one, middle, means=means, kept=kept)
+        if one.doubtful or rms(one.left) > _SLIPPED * least
+        else one
         for name, one in counted.items()
     }
     periods = {name: one.period for name, one in counted.items()}
@@ -294,10 +294,8 @@ def _clock(
             found.apart if means else np.zeros_like(found.apart),
             None if loops is None else loops.step_s[name],
         )
-        off = np.abs(found.left) > _DOUBTFUL * found.scale
-        left = (rest[name], rms(found.left[~off]))
-        doubtful = tuple(np.flatnonzero(off).tolist())
-        shown.append(SamplesShown(name, period, found.newest, apart, left, step, kept, doubtful))
+        left = (rest[name], rms(np.delete(found.left, found.doubtful)))
+        shown.append(SamplesShown(name, period, found.newest, apart, left, step, kept, found.doubtful))
     mean = float(np.mean(list(periods.values())))
     scatter = float(np.std(list(periods.values()), ddof=1)) if len(periods) > 1 else rows.sd_s
     return OwnClock(mean, scatter / np.sqrt(len(periods)), gain, tuple(shown), 0.5 if means else 0.0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -34,6 +35,8 @@ __all__ = [
     "signal_of",
     "signals_of",
     "slow_columns",
+    "slow_count",
+    "slow_sum",
     "steps",
     "still_part",
     "tone",
@@ -137,9 +140,22 @@ def signals_of(recording: Recording) -> list[Signal]:
 
 def slow_columns(t: FloatArray, end: float, knots_s: float) -> FloatArray:
     """Return cubic splines (n, p) at times (n,) s, for what is slow from 0 to ``end``: a knot each ``knots_s``."""
-    knots = np.concatenate([np.zeros(3), np.linspace(0.0, end, 2 + int(end / knots_s)), np.full(3, end)])
-    each = BSpline.construct_fast(knots, np.eye(knots.size - 4), 3)
-    return np.asarray(each(np.clip(t, 0.0, end * (1.0 - 1e-12))))
+    return np.asarray(slow_sum(t, end, knots_s, np.eye(slow_count(end, knots_s))))
+
+
+def slow_count(end: float, knots_s: float) -> int:
+    """Return how many splines `slow_columns` has."""
+    return int(_knots(end, knots_s).size) - 4
+
+
+def slow_sum(t: FloatArray, end: float, knots_s: float, x: Any) -> Any:
+    """Return what the splines of `slow_columns` with coefficients ``x`` (p, ...) add up to at times of any shape."""
+    each = BSpline.construct_fast(_knots(end, knots_s), x, 3)
+    return each(np.clip(t, 0.0, end * (1.0 - 1e-12)))
+
+
+def _knots(end: float, knots_s: float) -> FloatArray:
+    return np.concatenate([np.zeros(3), np.linspace(0.0, end, 2 + int(end / knots_s)), np.full(3, end)])
 
 
 def signal_of(recording: Recording, name: str) -> Signal | None:

@@ -164,7 +164,11 @@ def rows_of(recordings: Sequence[Recording], names: Sequence[str]) -> Rows | Non
         return None
     ordinary = float(np.median(np.concatenate([own.lasted for own in found])))
     ticks = np.geomspace(0.25, 1.3, 1200) * ordinary
-    scores = np.mean([[np.mean(np.cos(2.0 * np.pi * own.lasted / q)) for q in ticks] for own in found], axis=0)
+    # a wobble blurs the field's phase, and dies: rows of the second halves may gather where all do not
+    scores = max(
+        (np.mean([_gathered(own.lasted[own.lasted.size * k // 2 :], ticks) for own in found], axis=0) for k in (0, 1)),
+        key=np.max,
+    )
     if float(np.max(scores)) < _GATHERED:
         return None
     peaks = [k for k in range(1, ticks.size - 1) if scores[k] >= max(scores[k - 1], scores[k + 1])]
@@ -175,6 +179,11 @@ def rows_of(recordings: Sequence[Recording], names: Sequence[str]) -> Rows | Non
     # where all last the same number of ticks it was the phase's noise that made them look uneven
     unlike = np.mean([1.0 - max(rows.shares(item.name).values()) for item in found])
     return rows if unlike >= _SHARE else None
+
+
+def _gathered(lasted: FloatArray, ticks: FloatArray) -> FloatArray:
+    """Return how sharply durations (n,) gather at whole numbers of ticks (k,), the mean cosine of their phase."""
+    return np.asarray(np.mean(np.cos(2.0 * np.pi * lasted[None, :] / ticks[:, None]), axis=1))
 
 
 def _measured(found: Sequence[Durations], tick: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.exchange import eliminated_backward
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import RELAXED_FIT
@@ -35,7 +36,9 @@ def refitted_out_of_balance(found: Search) -> Search:
     if left_across(replace(final.fit, noise=fit.noise)) >= RELAXED_FIT.unbalanced * left_across(fit):
         return found
     of_motion = [candidate for candidate in every if candidate not in first.candidates]
-    return replace(found, final=_with_what_is_worth_it(found, final, of_motion))
+    # what stood for the bodies' own moments explains nothing beside them
+    final = eliminated_backward(found, _with_what_is_worth_it(found, final, of_motion))
+    return replace(found, final=final)
 
 
 def _with_what_is_worth_it(found: Search, final: ContinuousFit, candidates: Sequence[CandidateEffect]) -> ContinuousFit:

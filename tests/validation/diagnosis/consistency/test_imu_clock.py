@@ -73,6 +73,20 @@ def test_rows_that_are_read_in_step_stand_behind_the_samples_that_they_show_by_t
         assert true.mean() > 3e-3
 
 
+@pytest.mark.parametrize("seed", [1, 31, 41, 51])
+def test_samples_of_a_chip_that_is_nearly_as_fast_as_the_magnetometer_are_told_all_the_same(seed):
+    # the two slip by less than a sample in a throw: at one period for all, no phase is that of the first guess
+    chip = 1.002 * loop.PERIOD
+    made, clock = counted(seed, chip)
+    found = imu_clock_of(made, NAMES, clock)
+    assert found is not None
+    for k, one in enumerate(found.shown):
+        true = loop.chip_times(seed + k, chip)
+        # later on the wobble has died
+        off = (one.times * chip / one.period_s - true)[:100]
+        assert np.mean(np.abs(off - np.median(off)) < 0.4 * chip) > 0.98
+
+
 def test_a_disc_that_does_not_wobble_tells_nothing_of_its_chip():
     made, clock = counted(1, 0.0091)
     assert imu_clock_of(loop.without_wobble(made, 3), NAMES, clock) is None

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.logger_loop import LOOP, NAMES, PERIOD, logged, motions
 
+from discsim.validation.diagnosis.consistency.counted_samples import field_of, followed, unslipped
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
 
@@ -48,6 +49,22 @@ def test_single_samples_of_a_part_with_its_own_clock_are_told_by_those_that_are_
         assert np.mean(np.diff(item.newest) == np.diff(true)) > 0.98
         assert item.loop_s == pytest.approx(LOOP, rel=0.01)
         assert item.lost == pytest.approx(0.2, abs=0.06)
+
+
+@pytest.mark.parametrize(("seed", "at"), [(1, 8), (11, 30), (21, 90)])
+def test_a_slip_of_one_sample_is_found_by_the_row_that_no_sample_makes_read_as_it_does(seed, at):
+    recording, true = logged(motions()[0], seed, own_clock=True, weight=0.5)
+    field = field_of(recording)
+    assert field is not None
+    right = followed(field, true - true[0] + 2, np.ones(true.size, dtype=int), PERIOD, means=True)
+    slipped = right.newest.copy()
+    slipped[at:] += 1
+    # where a row beside it shows the sample that the first one slipped to, no later row can be counted one less there
+    slipped[at - 2] = slipped[at - 1] - 1
+    begun = followed(field, slipped, right.apart, PERIOD, means=True, rounds=1)
+    found = unslipped(field, begun, PERIOD, means=True, kept=False)
+    assert np.mean(np.diff(found.newest) == np.diff(true)) > 0.98
+    assert found.doubtful == ()
 
 
 def test_rows_are_put_where_their_samples_were_taken():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from discsim.effects.catalogue import effect
 from discsim.environment import Environment
 from discsim.motion import Motion
-from discsim.recording import Recording
+from discsim.recording import Recording, Samples
 from discsim.sensors import Gyroscope, Instruments, Magnetometer, Noise, Sampling, record
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import durations, rows_of
 
@@ -46,3 +48,18 @@ def test_a_tick_is_found_where_every_seventh_sample_is_skipped():
     assert rows is not None
     assert rows.tick_s == pytest.approx(0.5 * PERIOD, rel=5e-3)
     assert rows.gathered > 0.9
+
+
+def nodding(recording: Recording, rad: float) -> Recording:
+    """Return a recording whose field nods, as that of a disc that wobbles, by an angle that dies in the first half."""
+    own = recording.samples["magnetometer"]
+    nod = 45.0 * rad * np.exp(-own.t / 0.5) * np.exp(0.93j * SPIN * own.t)
+    value = own.value + np.column_stack([nod.real, nod.imag, np.zeros(own.t.size)])
+    return replace(recording, samples={**recording.samples, "magnetometer": Samples(own.t, value)})
+
+
+def test_a_tick_is_found_by_the_second_halves_where_a_wobble_blurs_the_first():
+    nod = [nodding(spun(*FREE, seed=seed), 0.15) for seed in (1, 2)]
+    rows = rows_of(nod, ["a", "b"])
+    assert rows is not None
+    assert rows.tick_s == pytest.approx(0.5 * PERIOD, rel=5e-3)
