@@ -29,6 +29,7 @@ __all__ = [
     "MOST_ROWS",
     "SHORTEST_STEP",
     "Limit",
+    "in_another_unit",
     "limit_of",
     "reading_fault",
     "time_fault",
@@ -133,6 +134,22 @@ _UNITS = (1e-3, 1e-6)
 _A_JUMP = 10.0
 #: fewest rows whose spacing shows a unit: of two or three any time between them is one
 _SHOWS_ITS_UNIT = 10
+
+
+#: other units in which disc and air are often written, and how much of the key's unit one of them is
+_ALSO_WRITTEN = MappingProxyType({"diameter_m": ("mm", 1e-3), "kg_m2": ("g cm2", 1e-7), "kg_m3": ("g/m3", 1e-3)})
+
+
+def in_another_unit(key: str, value: float) -> str:
+    """Return the question whether a number that is too large is in another unit, empty where none makes it sane.
+
+    >>> in_another_unit("diameter_m", 212.0)
+    '; in mm? that is 0.212'
+    """
+    for written, (unit, size) in _ALSO_WRITTEN.items():
+        if key.endswith(written) and abs(value) > limit_of(key).largest >= abs(value * size):
+            return f"; in {unit}? that is {value * size:.6g}"
+    return ""
 
 
 def limit_of(key: str) -> Limit:

@@ -18,7 +18,7 @@ from typing import Any
 from discsim.arrays import FloatArray, readonly
 from discsim.errors import InputError
 from discsim.files import read_text
-from discsim.limits import ANY_NUMBER, Limit, limit_of
+from discsim.limits import ANY_NUMBER, Limit, in_another_unit, limit_of
 
 __all__ = ["TomlTable", "obeyed_by_terminals", "parse_toml", "read_toml"]
 
@@ -219,6 +219,7 @@ class TomlTable:
         else:
             # what may not be negative is a size, and divides others
             expected = (limit or limit_of(key)).fault(value, divides=positive or minimum == 0.0)
+            expected += in_another_unit(key, value) if expected else ""
         if expected:
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, {expected}")
         return float(value)

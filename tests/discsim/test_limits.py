@@ -90,7 +90,13 @@ def test_a_reading_that_no_sensor_gives_is_refused_at_its_cell(tmp_path):
 NUMBERS = [
     ("mass_kg = 0.179", "mass_kg = 1e300", r"'disc.mass_kg' is 1e\+300, expected at most 1000 in size"),
     ("mass_kg = 0.179", "mass_kg = 1e-320", r"'disc.mass_kg' is 1e-320, expected at least 1e-06"),
-    ("diameter_m = 0.212", "diameter_m = 212.0", r"'disc.diameter_m' is 212.0, expected at most 100 in size"),
+    (
+        "diameter_m = 0.212",
+        "diameter_m = 212.0",
+        r"'disc.diameter_m' is 212.0, expected at most 100 .*; in mm\? that is 0.212",
+    ),
+    ("Izz_kg_m2 = 0.00115", "Izz_kg_m2 = 11500", r"at most 10000 in size; in g cm2\? that is 0.00115"),
+    ("density_kg_m3 = 1.204", "density_kg_m3 = 1204", r"at most 100 in size; in g/m3\? that is 1.204"),
     ("CLa = 2.1", "CLa = 1e12", r"'disc.aero.CLa' is 1000000000000.0, expected at most 1000 in size"),
     ("CLa = 2.1", "CLa = 2.1\nCLa_sigma = 1e-40", r"'disc.aero.CLa_sigma' is 1e-40, expected at least 1e-30"),
     ("[23.6, 5.5", "[2.36e7, 5.5", r"'release.velocity_ned_m_s' is 23600000.0, expected at most 10000 in size"),

@@ -14,8 +14,18 @@ from discsim.recording import Recording
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, board_effect
 from discsim.validation.diagnosis.setup.late_sensor import LateSensor
 from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
+from discsim.written import corrected
 
-__all__ = ["LateFault", "SetupFault", "SetupFindings", "SuspectedFault", "effect_of_hypothesis", "said", "with_fault"]
+__all__ = [
+    "LateFault",
+    "SetupFault",
+    "SetupFindings",
+    "SuspectedFault",
+    "effect_of_hypothesis",
+    "said",
+    "told_fault",
+    "with_fault",
+]
 
 
 @dataclass(frozen=True)
@@ -96,6 +106,21 @@ class SetupFindings:
     def effects(self) -> tuple[Effect, ...]:
         """The faults as effects."""
         return tuple(fault.effect for fault in self.faults)
+
+    def plus(self, fault: SetupFault) -> SetupFindings:
+        """Return findings with one more fault, for which the recordings are corrected."""
+        meant = tuple(corrected(one, [fault.effect]) for one in self.recordings)
+        return replace(self, faults=tuple(with_fault(self.faults, fault)), recordings=meant)
+
+    @property
+    def without_hints(self) -> SetupFindings:
+        """The same without the physics that does as well as a fault, where a fault is supposed in its place."""
+        return replace(self, hints=())
+
+
+def told_fault(effect: Effect, twins: Sequence[Effect] = ()) -> SetupFault:
+    """Return a fault that no relation tells but a fit, or an axis, which is as sure; ``twins`` do as well."""
+    return SetupFault(effect, float("inf"), None, tuple(twins))
 
 
 def with_fault(faults: Sequence[SetupFault], further: SetupFault) -> list[SetupFault]:

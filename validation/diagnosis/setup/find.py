@@ -22,6 +22,7 @@ from discsim.validation.diagnosis.setup.faults import (
     SetupFindings,
     SuspectedFault,
     effect_of_hypothesis,
+    told_fault,
     with_fault,
 )
 from discsim.validation.diagnosis.setup.hypotheses import (
@@ -199,8 +200,7 @@ def with_likeliest_fault(findings: SetupFindings, blamed: Collection[str] = ()) 
     if not found or found[0].kind == "rival" or not _gains(ranking.as_written, found[0]):
         return with_fault_that_follows(findings, blamed)
     fault = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
-    current = tuple(corrected(one, [fault.effect]) for one in findings.recordings)
-    return SetupFindings(tuple(with_fault(findings.faults, fault)), current)
+    return findings.without_hints.plus(fault)
 
 
 def with_turned_board(findings: SetupFindings) -> SetupFindings | None:
@@ -223,8 +223,7 @@ def with_turned_board(findings: SetupFindings) -> SetupFindings | None:
     effects = _turns(recordings)
     if not effects:
         return None
-    current = tuple(corrected(one, effects[:1]) for one in findings.recordings)
-    return SetupFindings((SetupFault(effects[0], float("inf"), None, effects[1:]),), current)
+    return findings.without_hints.plus(told_fault(effects[0], effects[1:]))
 
 
 def _turns(recordings: Sequence[Recording]) -> tuple[Effect, ...]:

@@ -16,7 +16,7 @@ from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.kind import BOARD
 from discsim.effects.setup import Axes, TimeOffset, axes_of
 from discsim.recording import Recording
-from discsim.validation.diagnosis.setup.faults import SetupFault, SetupFindings, effect_of_hypothesis, with_fault
+from discsim.validation.diagnosis.setup.faults import SetupFindings, effect_of_hypothesis, told_fault
 from discsim.validation.diagnosis.setup.hypotheses import MOST_TWINS, TWIN, Hypothesis, chosen, hypotheses
 from discsim.validation.diagnosis.setup.judged import judgeable
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit, short_fit
@@ -59,7 +59,7 @@ def with_fault_that_follows(findings: SetupFindings, sensors: Collection[str]) -
         if left and min(left) < _FOLLOWS:
             alike = [k for k in range(len(left)) if left[k] < _ALIKE * min(left)]
             best, *others = sorted(alike, key=lambda k: (tried[k].size, left[k]))
-            return _with(findings, effects[best], [effects[k] for k in others])
+            return findings.plus(told_fault(effects[best], [effects[k] for k in others]))
     return _with_times(findings, some) if {*sensors} & {*_TIMED} else None
 
 
@@ -82,19 +82,12 @@ def _with_times(findings: SetupFindings, some: Sequence[Recording]) -> SetupFind
     if best.left > _FOLLOWS:
         return None
     alike = [one for one in found if one[0].left < _ALIKE * best.left and one[1].id != effect.id]
-    return _with(findings, effect, [min(alike, key=lambda one: one[0].merit)[1]] if alike else [])
+    return findings.plus(told_fault(effect, [min(alike, key=lambda one: one[0].merit)[1]] if alike else []))
 
 
 def _leaves_axis(item: Hypothesis) -> bool:
     """Tell whether a sensor's columns under a hypothesis have the spin axis where they have it as written."""
     return bool(abs(item.columns.of(item.sensor)[2, 2]) > 0.5)
-
-
-def _with(findings: SetupFindings, effect: Effect, twins: Sequence[Effect]) -> SetupFindings:
-    """Return findings with one more fault that a fit tells, and what is as likely."""
-    fault = SetupFault(effect, float("inf"), None, tuple(twins))
-    current = tuple(corrected(one, [effect]) for one in findings.recordings)
-    return SetupFindings(tuple(with_fault(findings.faults, fault)), current, findings.hints)
 
 
 def with_axes_as_read(findings: SetupFindings, reads: Mapping[str, FloatArray]) -> SetupFindings:
@@ -111,7 +104,7 @@ def with_axes_as_read(findings: SetupFindings, reads: Mapping[str, FloatArray]) 
     for sensor, own in fewest.items():
         if not np.array_equal(own, np.eye(3)):
             effect = effect_of(Axes(axes_of(own)), sensor)
-            findings = _with(findings, effect, _twins(findings.recordings, effect))
+            findings = findings.plus(told_fault(effect, _twins(findings.recordings, effect)))
     return findings
 
 
