@@ -20,7 +20,7 @@ from discsim.validation.diagnosis.command_followed import not_as_commanded
 from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
-from discsim.validation.diagnosis.design.next_recording import advise, confusions, in_words
+from discsim.validation.diagnosis.design.next_recording import BY_HAND, advise, confusions, in_words
 from discsim.validation.diagnosis.detectors.even_losses import beside_losses, lost_as_well, rather_lost
 from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from discsim.validation.diagnosis.leftovers import pure_noise
@@ -117,7 +117,8 @@ def _named(
     for rival in confusions(found, candidate):
         rival_bic = gain - rival.worse - len(parameters_of(rival.candidate)) * float(np.log(max(final.fit.count, 2)))
         told = advice.get((candidate.name, rival.candidate.name))
-        confused.append(Confusion(rival.candidate.id, float(rival_bic), in_words(candidate.id, told), told))
+        words = BY_HAND if found.at_once else in_words(candidate.id, told)
+        confused.append(Confusion(rival.candidate.id, float(rival_bic), words, told))
     instead = rather_lost(final.fit, candidate)
     if instead is None and (lost := lost_as_well(final.fit, candidate)) is not None:
         id, share, sd = lost

@@ -35,6 +35,7 @@ from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import Anew, search
+from discsim.validation.diagnosis.selection.turned_or_iron import with_iron_weighed
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import (
     free_parameters,
@@ -184,7 +185,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     if law_of_all.found is not None:
         return Tried(ready, None, found.at_base(), law_of_all.found)
     if ready.rows is not None:  # no bent segments there: defects of continuity are wide, and the pure error is known
-        found = refitted_out_of_balance(found)
+        found = with_iron_weighed(refitted_out_of_balance(found))
     elif followed.plant.weakly_identified:
         found = _with_bends(found, followed, problem)
     return Tried(ready, None, found)

@@ -54,6 +54,11 @@ _ALIKE = 5e-3
 _FEW_ROUNDS, _ROUNDS = 4, 12
 #: combs that are begun with: periods as quantiles of a range, and phases
 _STARTS, _PHASES = (0.2, 0.4, 0.6, 0.8), 4
+#: periods of which all recordings are tried at each, in the range in which they count as one
+_PERIODS = 9
+#: where a recording may be miscounted from is looked for in the worst block of so many rows, so many times; there a row
+#: counts for no more than so many medians
+_BLOCK, _SLIPS, _LOUD = 15, 5, 10.0
 #: twice the log likelihood that a recording must gain beyond what its choices cost, as for the samples of the field,
 #: and that all must gain beyond what a comb gains whose period is another by more than the next number
 _PRICE, _ANOTHER = 24.0, 0.02
@@ -338,7 +343,7 @@ def _from_all_phases(wobble: _Wobble, first: _Fitted, periods: FloatArray) -> _C
     Of a slight wobble many are nearly as good as their neighbours.
     """
     begun: list[FloatArray | None] = [None]
-    for period in np.quantile(periods, _STARTS):
+    for period in np.unique(np.quantile(periods, _STARTS)):
         for phase in period * np.arange(_PHASES) / _PHASES:
             begun.append(phase + period * np.rint((wobble.asked - phase) / period))
     found = [_followed(wobble, first, periods, _FEW_ROUNDS, one) for one in begun]
@@ -438,13 +443,51 @@ def _at_one_period(
 ) -> Mapping[str, _Comb]:
     """Return the combs of all recordings at one period, where that tells more than each its ``own``.
 
-    They are of one chip. A recording that was miscounted has another period; tried are those that they found.
+    They are of one chip. A recording that was miscounted has another period; tried are those that they found and some
+    all over the range. What counts is samples: the best of a recording, wherever it was found, is tried at each period.
     """
-    best = own
-    for period in {one.period for one in own.values()} | {float(np.median([one.period for one in own.values()]))}:
-        tried = {name: _from_all_phases(one, first[name], np.array([period])) for name, one in wobbles.items()}
-        best = max(best, tried, key=lambda combs: sum(one.gain for one in combs.values()))
+    found = [one.period for one in own.values()]
+    middle = float(np.median(found))
+    ends = middle * (1.0 - _ALIKE), middle * (1.0 + _ALIKE)
+    best, samples = own, dict(own)
+    for period in {*found, middle, *np.linspace(*ends, _PERIODS).tolist()}:
+        for name, one in wobbles.items():
+            tried = _from_all_phases(one, first[name], np.array([period]))
+            samples[name] = max(samples[name], tried, key=lambda comb: comb.gain)
+    samples = {name: _unslipped(one, first[name], samples[name]) for name, one in wobbles.items()}
+    for period in {*found, middle, *np.linspace(*ends, 4 * _PERIODS - 3).tolist()}:
+        combs = {name: _at_period(one, first[name], samples[name], period) for name, one in wobbles.items()}
+        best = max(best, combs, key=lambda tried: sum(comb.gain for comb in tried.values()))
     return best
+
+
+def _unslipped(wobble: _Wobble, first: _Fitted, comb: _Comb) -> _Comb:
+    """Return a comb whose rows from some row on are a sample off, which bends the wobble, counted rightly there."""
+    period = np.array([comb.period])
+    for _ in range(_SLIPS):
+        tried = [comb]
+        left = np.abs(_fit(wobble, comb.times).left)
+        block = np.convolve(np.minimum(left, _LOUD * np.median(left)), np.ones(_BLOCK), "same")
+        worst = int(np.argmax(block))
+        for row in range(max(worst - _BLOCK // 2, 1), min(worst + _BLOCK // 2 + 1, left.size)):
+            for more in (-comb.period, comb.period):
+                times = comb.times + more * (np.arange(comb.times.size) >= row)
+                tried.append(_followed(wobble, first, period, _FEW_ROUNDS, _amid(wobble, times, comb.period)))
+        better = max(tried, key=lambda one: one.gain)
+        if better.gain < comb.gain + _PRICE:
+            break
+        comb = better
+    return comb
+
+
+def _at_period(wobble: _Wobble, first: _Fitted, comb: _Comb, period: float) -> _Comb:
+    """Return a comb followed on from its samples at another period, amid what they may be.
+
+    Parts that are nearly as fast slip by less than a sample in a throw: many periods tell the same samples.
+    """
+    count = np.rint((comb.times - comb.times[0]) / comb.period)
+    times = _amid(wobble, comb.times[0] + period * count, period)
+    return _followed(wobble, first, np.array([period]), _ROUNDS, times)
 
 
 def _with_late_rows(wobbles: Mapping[str, _Wobble], clock: OwnClock, comb: ImuClock | None) -> ImuClock | None:

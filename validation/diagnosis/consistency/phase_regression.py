@@ -9,6 +9,7 @@ the time, or the rate, is wrong.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 
-from discsim.arrays import ComplexArray, FloatArray, sd_by_median
+from discsim.arrays import ComplexArray, FloatArray, readonly, sd_by_median
 from discsim.recording import Recording, Samples
 from discsim.sensors.accelerometer import force_at
 
@@ -154,8 +155,9 @@ def slow_sum(t: FloatArray, end: float, knots_s: float, x: Any) -> Any:
     return each(np.clip(t, 0.0, end * (1.0 - 1e-12)))
 
 
+@lru_cache(maxsize=64)
 def _knots(end: float, knots_s: float) -> FloatArray:
-    return np.concatenate([np.zeros(3), np.linspace(0.0, end, 2 + int(end / knots_s)), np.full(3, end)])
+    return readonly(np.concatenate([np.zeros(3), np.linspace(0.0, end, 2 + int(end / knots_s)), np.full(3, end)]))
 
 
 def signal_of(recording: Recording, name: str) -> Signal | None:

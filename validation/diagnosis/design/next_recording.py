@@ -58,6 +58,10 @@ def _once(id: str) -> bool:
     return id in CATALOGUE and CATALOGUE[id].event
 
 
+#: of rows that were counted no recording is simulated; what is asked of them is how chips sit, and what is near them
+BY_HAND = "the disc turned slowly by hand about all three axes: what stands still along the axis of a spin moves there."
+
+
 def in_words(id: str, advice: Advice | None) -> str:
     """Return what to record next to tell an effect from another, as a sentence without its first word's capital."""
     if _once(id):
@@ -118,9 +122,11 @@ def advise(found: Search, names: Sequence[str], plans: Sequence[Plan] | None = N
 
     ``names`` are those of the recordings; ``plans`` recordings that could be made, by default such as are made easily
     about those in hand. Keys are the names of the two candidates. What happened in one recording only, at one instant,
-    has no advice: no new recording holds it.
+    has no advice: no new recording holds it. Nor have effects beside rows that were counted.
     """
-    advice = {}
+    advice: dict[tuple[str, str], Advice] = {}
+    if found.at_once:
+        return advice
     for candidate in found.final.hypothesis.candidates:
         rivals = confusions(found, candidate)
         if not rivals or _once(candidate.id):

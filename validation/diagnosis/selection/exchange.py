@@ -36,6 +36,7 @@ __all__ = [
     "eliminated_backward",
     "exchanged",
     "in_reach",
+    "rival_of",
     "rivals_of",
     "takes_its_place",
     "tried_without",
@@ -155,7 +156,6 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
 
 def _rivals(found: Search, candidate: CandidateEffect) -> list[Rival]:
     """Return the effects that could stand in for one of the final hypothesis, each refitted in its place."""
-    final, rest = found.final, found.final.hypothesis.without(candidate)
     rivals: list[Rival] = []
     seen: set[str] = set()
     for worse, screened in _by_algebra(found, candidate):
@@ -165,11 +165,26 @@ def _rivals(found: Search, candidate: CandidateEffect) -> list[Rival]:
             continue
         refitting(f"refitting in place of {candidate.id}", other.id, len(seen), most)
         seen.add(other.id)
-        start = from_here(screened, final).start
-        fitted = continuous_fit(final.fit, rest.plus(other), found.own, final.fit.noise, start, bars=in_reach(final))
-        fitted = found.with_cost(fitted)
-        rivals.append(Rival(other, fitted.worse_than(final), fitted))
+        rivals.append(_refitted(found, candidate, screened))
     return rivals
+
+
+def rival_of(found: Search, candidate: CandidateEffect, other: str) -> Rival | None:
+    """Return the effect with an id ``other`` refitted in the place of a named one, None where algebra sees it far off.
+
+    Equations are about the final fit.
+    """
+    near = (screened for _, screened in _by_algebra(found, candidate) if screened.candidate.id == other)
+    return next((_refitted(found, candidate, screened) for screened in near), None)
+
+
+def _refitted(found: Search, candidate: CandidateEffect, screened: ScreenedCandidate) -> Rival:
+    """Return an effect refitted in the place of one of the final hypothesis from where algebra has it."""
+    final, other = found.final, screened.candidate
+    rest, start = final.hypothesis.without(candidate), from_here(screened, final).start
+    fitted = continuous_fit(final.fit, rest.plus(other), found.own, final.fit.noise, start, bars=in_reach(final))
+    fitted = found.with_cost(fitted)
+    return Rival(other, fitted.worse_than(final), fitted)
 
 
 def _by_algebra(found: Search, candidate: CandidateEffect) -> list[tuple[float, ScreenedCandidate]]:

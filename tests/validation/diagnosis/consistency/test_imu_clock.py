@@ -73,7 +73,7 @@ def test_rows_that_are_read_in_step_stand_behind_the_samples_that_they_show_by_t
         assert true.mean() > 3e-3
 
 
-@pytest.mark.parametrize("seed", [1, 31, 41, 51])
+@pytest.mark.parametrize("seed", [1, 21, 41, 51])
 def test_samples_of_a_chip_that_is_nearly_as_fast_as_the_magnetometer_are_told_all_the_same(seed):
     # the two slip by less than a sample in a throw: at one period for all, no phase is that of the first guess
     chip = 1.002 * loop.PERIOD

@@ -1,0 +1,48 @@
+"""A magnetometer that is turned in its board, or soft iron near it: of a spin about z each shows what the other does.
+
+Takes what was found beside counted rows, all effects at once; gives it with the one in the place of the other where
+that explains more, and with the other beside it where the recordings cannot tell the two apart. Along the axis of the
+spin the field stands still, so that the part of it which either adds to x and y is one more hard iron; what is left of
+both is a share of x and y in z. Soft iron alone makes an ellipse of the circle that x and y run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from discsim.effects.catalogue import catalogued
+from discsim.effects.mount_rows import Mount
+from discsim.effects.sensors import SoftIron
+from discsim.validation.diagnosis.selection.evidence import lead
+from discsim.validation.diagnosis.selection.exchange import rival_of
+from discsim.validation.diagnosis.selection.search_state import Search, possible
+from discsim.validation.diagnosis.settings import SELECTION
+
+__all__ = ["with_iron_weighed"]
+
+_TURNED, _IRON = (catalogued(kind, "magnetometer").id for kind in (Mount, SoftIron))
+_IN_PLACE = {_TURNED: _IRON, _IRON: _TURNED}
+
+
+def with_iron_weighed(found: Search) -> Search:
+    """Return a search of which a turned magnetometer or soft iron has the other as its rival, or gives way to it.
+
+    The fit that begins with few effects, and turned chips among them, may end beside its optimum with soft iron. The
+    six numbers of that must gain more than single rows that are miscounted leave.
+    """
+    for _ in _IN_PLACE:
+        found = found.about(found.final.fit)
+        present = {one.id: one for one in found.final.hypothesis.candidates if one.id in _IN_PLACE}
+        if len(present) != 1:
+            break
+        (candidate,) = present.values()
+        rival = rival_of(found, candidate, _IN_PLACE[candidate.id])
+        if rival is None or not possible(rival.fitted):
+            break
+        found = replace(found, rivals={**found.rivals, candidate.name: [rival]})
+        told = rival.fitted.told(rival.candidate), found.final.told(candidate)
+        odd = SELECTION.miscounted if rival.candidate.id == _IRON else 0.0
+        if rival.worse + lead(rival.candidate, candidate, *told) + odd >= 0.0:
+            break
+        found = replace(found, final=rival.fitted, rivals={})
+    return found
