@@ -214,7 +214,7 @@ _TURNED = catalogued(BoardRotation).id
 def on_board_axes(effects: Sequence[NamedEffect], findings: SetupFindings, fit: Fit) -> tuple[NamedEffect, ...]:
     """Return effects whose vectors of a sensor are along the axes of a turned board, as they are in its readings.
 
-    The fit had readings C (C^T w + b) of a board that is turned by C: what it found is C b.
+    The fit had readings C ((I + S) C^T w + b) of a board that is turned by C: what it found is C b, and C S C^T.
     """
     first = next((Rotation.from_rotvec(_numbers(f.effect.value)) for f in findings.faults if f.id == _TURNED), None)
     if first is None:
@@ -224,16 +224,31 @@ def on_board_axes(effects: Sequence[NamedEffect], findings: SetupFindings, fit: 
     def turned(one: NamedEffect) -> NamedEffect:
         names = list(one.parameters)
         kind = CATALOGUE.get(one.id)
-        if kind is None or kind.acts_on not in BOARD or [name[:2] for name in names] != ["bx", "by", "bz"]:
+        change = None if kind is None or kind.acts_on not in BOARD else _onto(names, C)
+        if change is None:
             return one
-        value = C.T @ np.array([item.value for item in one.parameters.values()])
+        value = change @ np.array([item.value for item in one.parameters.values()])
         covariance = _covariance_of(fit, one.id, names)
-        sd: list[float | None] = [None] * 3
+        sd: list[float | None] = [None] * len(names)
         if covariance is not None and all(item.sd is not None for item in one.parameters.values()):
-            sd = np.sqrt(np.diag(C.T @ covariance @ C)).tolist()
+            sd = np.sqrt(np.diag(change @ covariance @ change.T)).tolist()
         return replace(one, parameters=dict(zip(names, map(ParameterValue, value.tolist(), sd), strict=True)))
 
     return tuple(map(turned, effects))
+
+
+def _onto(names: Sequence[str], C: FloatArray) -> FloatArray | None:
+    """Return what takes an effect's parameters (k,) along the axes of a disc to those of a board turned by C (3, 3).
+
+    C^T b of a bias or hard iron b, and C^T S C of soft iron S; None where the effect is neither.
+    """
+    if [name[:2] for name in names] == ["bx", "by", "bz"]:
+        return C.T
+    if tuple(names) != SoftIron._fields:
+        return None
+    # linear in S: the columns are what becomes of one number alone
+    every = [soft_iron(SoftIron(*one), np.eye(3)) - np.eye(3) for one in np.eye(6)]
+    return np.column_stack([(C.T @ S @ C)[np.triu_indices(3)] for S in every])
 
 
 def _covariance_of(fit: Fit, id: str, names: Sequence[str]) -> FloatArray | None:

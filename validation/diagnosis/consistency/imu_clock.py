@@ -67,6 +67,8 @@ _PRICE, _ANOTHER = 24.0, 0.02
 _SHIFTS = np.array(sorted(np.linspace(-0.5, 0.5, 11), key=abs))
 #: two parts tell one tick where the shorter is at least this share of the longer: each is the least that does
 _ONE_TICK = 0.5
+#: a tick is settled where a round changes it by less, s: a thousandth of one
+_SAME_TICK = 1e-6
 #: what chooses one of two teeth costs, in twice the log likelihood
 _CHOICE = 2.0 * float(np.log(2.0))
 #: a comb this near to the logger's loop is the loop itself: the chip is read as it is sampled
@@ -202,6 +204,16 @@ class _Wobble:
             + np.exp(-1j * psi) * slow_sum(t - start, end - start, _SLOW_S, carried)
         )
 
+    def change(self, t: FloatArray, turning: ComplexArray, x: ComplexArray) -> ComplexArray:
+        """Return how fast what turns, (n,) at times (n,), of coefficients (p,), changes, 1/s.
+
+        Beside the spin it turns by what its slow amplitude does: air and tilt precess a disc by some per cent of that.
+        """
+        start, end = self.asked[0] - 2.0 * self.within, self.asked[-1] + 2.0 * self.within
+        psi = self.turned(t) - self.turned(0.0)
+        slow = np.exp(1j * self.order * psi) * slow_sum(t - start, end - start, _KNOTS_S, x, slope=True)
+        return np.asarray(1j * self.order * self.spin(t) * turning + slow)
+
 
 def _wobble_of(recording: Recording, shown: SamplesShown, period: float) -> _Wobble | None:
     """Return the wobble of a recording at the samples of the field that its rows show, None where none is told.
@@ -243,7 +255,7 @@ def _fit(wobble: _Wobble, t: FloatArray) -> _Fitted:
     x = np.asarray(np.linalg.solve(gram, columns.conj().T @ wobble.value), dtype=np.complex128)
     left = wobble.value - columns @ x
     rms = float(np.sqrt(np.sum(np.abs(left) ** 2) / (2.0 * (t.size - x.size))))
-    change = 1j * wobble.order * wobble.spin(t) * (columns[:, :fast] @ x[:fast])
+    change = wobble.change(t, columns[:, :fast] @ x[:fast], x[:fast])
     size = np.abs(change) ** 2
     late = np.real(np.conj(change) * left) / (size + np.mean(np.abs(left) ** 2))
     told = np.clip(t + late, wobble.asked - 1.2 * wobble.within, wobble.asked + 1.2 * wobble.within)
@@ -539,9 +551,11 @@ def _late_by_phase(wobble: _Wobble, due: FloatArray, tick: float) -> tuple[BoolA
         reads = [wobble.columns(due + tick * one)[0] @ fitted.x for one in (0.0, 1.0)]
         now = np.abs(wobble.value - reads[1]) < np.abs(wobble.value - reads[0])
         off, weight = fitted.told - due - tick * late, fitted.weight
+        more = 0.0
         if 0 < np.count_nonzero(now) < now.size:
-            tick += float(np.average(off[now], weights=weight[now]) - np.average(off[~now], weights=weight[~now]))
-        if np.array_equal(now, late):
+            more = float(np.average(off[now], weights=weight[now]) - np.average(off[~now], weights=weight[~now]))
+        tick += more
+        if np.array_equal(now, late) and abs(more) < _SAME_TICK:
             break
         late = now
     return late, tick
@@ -571,7 +585,8 @@ def _beside_a_late_loop(wobbles: Mapping[str, _Wobble], comb: ImuClock) -> ImuCl
     needed = [late_needed(one) for one in (field, chip)]
     if agreed > 0.0 and min(needed)[0] > _ONE_TICK * max(needed)[0]:
         agreed = max(agreed, min(gain for _, gain in needed))
-    # so few rows that were late are near the end of their windows
-    near = MISCOUNTED * comb.period_s / max(found.fraction, MISCOUNTED)
-    tick_sd = float(np.hypot(found.tick_sd_s, near))
-    return replace(comb, late=replace(found, tick_s=tick, tick_sd_s=tick_sd, agreed=agreed))
+    # where none was miscounted the least tick has left so many out, late ones at one end and those on time at the other
+    share = min(max(found.fraction, MISCOUNTED), 1.0 - MISCOUNTED)
+    late, on_time = MISCOUNTED * comb.period_s / share, MISCOUNTED * comb.period_s / (1.0 - share)
+    tick_sd = float(np.hypot(found.tick_sd_s, late))
+    return replace(comb, late=replace(found, tick_s=tick + late + on_time, tick_sd_s=tick_sd, agreed=agreed))

@@ -39,6 +39,8 @@ __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
 
 #: a recording that is left with so many times what the best one is may be miscounted somewhere
 _SLIPPED = 1.3
+#: so many rows that no sample makes read as they do a slip leaves at the most, where a motion bends to what follows it
+_FEW = 5
 #: by how much the times of rows that show the same sample run on, s
 _RUNS_ON = 1e-9
 #: how long before the first row a motion begins, in periods: half a mean, and a part that is late by as much
@@ -223,6 +225,8 @@ def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Ro
         ({n: count_samples(f, ticks * rows.tick_s, means=True) for n, f in fields.items()} for ticks in (1.0, 2.0)),
         key=_total,
     )
+    # a slip in one recording weighs as much as what tells means from single samples
+    single, means = _unslipped(fields, single, means=False), _unslipped(fields, means, means=True)
     gain = _total(single) - _total(means)
     kept = _kept_rows(fields, rows)
     if kept is not None and (gains := min(_total(single), _total(means)) - _total(kept[1])) >= PRICE * len(fields):
@@ -257,6 +261,23 @@ def _kept_rows(fields: Mapping[str, Field], rows: Rows) -> tuple[bool, dict[str,
     return min(tried, key=lambda one: _total(one[1]), default=None)
 
 
+def _unslipped(
+    fields: Mapping[str, Field], counted: Mapping[str, Counted], *, means: bool, kept: bool = False
+) -> dict[str, Counted]:
+    """Return counted samples of which those are counted again that leave more than others, or few rows off any sample.
+
+    Where many rows are off, nothing is counted wrongly: they show something else.
+    """
+    least = min(rms(one.left) for one in counted.values())
+    middle = float(np.median([one.period for one in counted.values()]))
+    return {
+        name: unslipped(fields[name], one, middle, means=means, kept=kept)
+        if 0 < len(one.doubtful) <= _FEW or rms(one.left) > _SLIPPED * least
+        else one
+        for name, one in counted.items()
+    }
+
+
 def _clock(
     fields: Mapping[str, Field],
     counted: Mapping[str, Counted],
@@ -273,14 +294,7 @@ def _clock(
     Takes what is left of each field, ``rest``, where rows last whole ticks. Rows show ``means`` of two samples, or
     ``loops`` may tell the clock by what they skip; ``kept`` tells that none is lost.
     """
-    least = min(rms(one.left) for one in counted.values())
-    middle = float(np.median([one.period for one in counted.values()]))
-    counted = {
-        name: unslipped(fields[name], one, middle, means=means, kept=kept)
-        if one.doubtful or rms(one.left) > _SLIPPED * least
-        else one
-        for name, one in counted.items()
-    }
+    counted = _unslipped(fields, counted, means=means, kept=kept)
     periods = {name: one.period for name, one in counted.items()}
     shown = []
     for name, field in fields.items():

@@ -149,10 +149,13 @@ def slow_count(end: float, knots_s: float) -> int:
     return int(_knots(end, knots_s).size) - 4
 
 
-def slow_sum(t: FloatArray, end: float, knots_s: float, x: Any) -> Any:
-    """Return what the splines of `slow_columns` with coefficients ``x`` (p, ...) add up to at times of any shape."""
+def slow_sum(t: FloatArray, end: float, knots_s: float, x: Any, *, slope: bool = False) -> Any:
+    """Return what the splines of `slow_columns` with coefficients ``x`` (p, ...) add up to at times of any shape.
+
+    Or the ``slope`` of that, in 1/s.
+    """
     each = BSpline.construct_fast(_knots(end, knots_s), x, 3)
-    return each(np.clip(t, 0.0, end * (1.0 - 1e-12)))
+    return each(np.clip(t, 0.0, end * (1.0 - 1e-12)), 1 if slope else 0)
 
 
 @lru_cache(maxsize=64)

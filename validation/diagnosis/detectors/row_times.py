@@ -132,7 +132,13 @@ class RowTimes:
         clock = replace(self.clock, period_s=self.clock.period_s / field, sd_s=self.clock.period_s * own)
         imu = self.imu
         if imu is not None:
-            imu = replace(imu, period_s=imu.period_s / ratio, sd_s=float(np.hypot(imu.sd_s, imu.period_s * sd)))
+            late = imu.late
+            if late is not None:
+                late = replace(
+                    late, tick_s=late.tick_s / ratio, tick_sd_s=float(np.hypot(late.tick_sd_s, late.tick_s * sd))
+                )
+            own_sd = float(np.hypot(imu.sd_s, imu.period_s * sd))
+            imu = replace(imu, period_s=imu.period_s / ratio, sd_s=own_sd, late=late)
         return replace(self, clock=clock, imu=imu)
 
     def effects(self) -> tuple[NamedEffect, ...]:
