@@ -173,6 +173,16 @@ def test_a_ripple_is_the_same_with_its_sign_turned_and_half_a_turn_of_phase():
     assert [item.in_sd for item in deviations] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.parametrize(("other", "counted"), [(-3.0, True), (1.0, False)])
+def test_numbers_of_a_turn_count_where_the_other_one_that_does_as_well_is_not_the_concealed_one(other, counted):
+    given = answer(effects=("board.rotation",), plant="free_spin", parameters={"rx_rad": 1.0})
+    found = named("board.rotation", confused=("board.rotation",), rx_rad=(-2.0, 1e-3))
+    found["confused_with"][0]["parameters"] = {"rx_rad": {"value": other, "sd": None}}
+    score = score_case(given, diagnosis("explained", found))
+    assert score.right_set
+    assert bool(score.deviations) is counted
+
+
 def test_recalibrated_coefficients_are_counted_too():
     given = answer("beyond_sigma", "recalibrated", effects=(), parameters={}, moved={"CL0": 0.14, "CD0": 0.06})
     score = score_case(given, diagnosis("recalibrated", CL0=(0.141, 0.0005)))

@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import isfinite, pi
+from math import inf, isfinite, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -212,6 +212,8 @@ def _deviations(
             continue
         if row(id).event and not _at_instant(answer, effect):
             continue  # another event: its numbers have no true ones
+        if _is_the_other(answer, effect):
+            continue  # of two ways to say it that no recording tells apart the other one is concealed
         none = row(id).sizes
         found = {name: (item["value"], item["sd"]) for name, item in effect["parameters"].items()}
         for name, (value, sd) in _one_way_to_say_it(id, found).items():
@@ -223,6 +225,18 @@ def _deviations(
         for key in _RIG_KEYS.get(name, (name,)):
             if key in recalibrated:
                 yield Deviation(RECALIBRATED, name, true, recalibrated[key]["value"], recalibrated[key]["sd"])
+
+
+def _is_the_other(answer: Answer, effect: Mapping[str, Any]) -> bool:
+    """Tell whether the concealed numbers are nearer to those of another way that an effect lists for itself."""
+
+    def off(parameters: Mapping[str, Mapping[str, Any]]) -> float:
+        sizes = {name: answer.size(effect["id"], name) for name in parameters}
+        known = [float(parameters[name]["value"]) - size for name, size in sizes.items() if size is not None]
+        return sum(one**2 for one in known) if known else inf
+
+    alike = [other.get("parameters", {}) for other in effect["confused_with"] if other["id"] == effect["id"]]
+    return min(map(off, alike), default=inf) < off(effect["parameters"])
 
 
 def has_power_law(answer: Answer) -> bool:
