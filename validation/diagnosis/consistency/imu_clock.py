@@ -22,13 +22,12 @@ from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.compiled import compiled
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.consistency.late_rows import (
-    MISCOUNTED,
     LateRows,
     Windows,
     asked_within,
-    late_all_along,
-    late_needed,
+    even_loop,
     late_rows_of,
+    loops_with_late_rows,
     rows_decided,
 )
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, SamplesShown
@@ -65,8 +64,6 @@ _PRICE, _ANOTHER = 24.0, 0.02
 #: times that all rows may be off by, of a period, the nearest first: a wobble that turns by 0.5 rad in a period turns
 #: by 0.05 from one to the next, a twentieth of its size
 _SHIFTS = np.array(sorted(np.linspace(-0.5, 0.5, 11), key=abs))
-#: two parts tell one tick where the shorter is at least this share of the longer: each is the least that does
-_ONE_TICK = 0.5
 #: a tick is settled where a round changes it by less, s: a thousandth of one
 _SAME_TICK = 1e-6
 #: what chooses one of two teeth costs, in twice the log likelihood
@@ -409,15 +406,13 @@ def _own_comb(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | Non
             best = _from_all_phases(wobble, first[name], periods[np.abs(periods / told - 1.0) <= _ALIKE])
         if best.gain < _PRICE:
             return None
-        times = _amid(wobble, best.times, best.period)
-        found.append(ImuRows(name, best.period, wobble.written, times, (first[name].rms, best.rms), best.gain))
-    own = np.array([one.period_s for one in found])
+        found.append(ImuRows(name, best.period, wobble.written, best.times, (first[name].rms, best.rms), best.gain))
     loops = [one.loop_s for one in clock.shown if one.loop_s is not None]
-    period = float(np.mean(own))
+    period = float(np.mean([one.period_s for one in found]))
     same = bool(loops) and abs(period / float(np.median(loops)) - 1.0) < _SAME
-    if same:
-        found = [_asked_between(one, wobbles[one.recording]) for one in found]
-    return ImuClock(period, float(np.std(own, ddof=1) / np.sqrt(own.size)), tuple(found), same)
+    placed = _asked_between if same else _beside_the_loop
+    found = [placed(one, wobbles[one.recording]) for one in found]
+    return _clock_of(found, same)
 
 
 def _amid(wobble: _Wobble, times: FloatArray, period: float) -> FloatArray:
@@ -431,23 +426,35 @@ def _amid(wobble: _Wobble, times: FloatArray, period: float) -> FloatArray:
 
 
 def _asked_between(rows: ImuRows, wobble: _Wobble) -> ImuRows:
-    """Return rows of the loop's own instants where these lie between a row's newest sample of the field and the next.
+    """Return rows of the loop's own instants, between a row's newest sample of the field and the next."""
+    placed = _evenly_between(rows, wobble.asked, wobble.asked + wobble.within)
+    return replace(placed, period_s=rows.period_s)
+
+
+def _beside_the_loop(rows: ImuRows, wobble: _Wobble) -> ImuRows:
+    """Return rows of the chip's newest samples before the instants of the even loop that asked for both parts."""
+    due = even_loop(_windows(wobble), float(np.median(np.diff(wobble.written))))
+    return _evenly_between(rows, due - rows.period_s, due)
+
+
+def _evenly_between(rows: ImuRows, early: FloatArray, late: FloatArray) -> ImuRows:
+    """Return rows of evenly spaced instants that stay farthest within bounds (n,), s.
 
     A wobble's phase tells instants roughly, and but for one time that all are off by. Beside a part that free-runs they
-    are of every age from none to a period of it: the evenly spaced instants that stay farthest within these bounds are
-    found by linear programming, a row that was miscounted paying for how far it is outside.
+    are of every age from none to a period of it, which tells that time and the spacing: they are found by linear
+    programming, a row that was miscounted paying for how far it is outside.
     """
     step = np.rint((rows.times - rows.times[0]) / rows.period_s)
     count, one = step.size, np.ones((step.size, 1))
     own = -np.eye(count)
     # unknowns: first instant, spacing, least distance from a bound, how far each row is outside
-    late = np.hstack([-one, -step[:, None], one, own])
-    early = np.hstack([one, step[:, None], one, own])
+    sides = [np.hstack([sign * one, sign * step[:, None], one, own]) for sign in (-1.0, 1.0)]
     cost = np.concatenate([[0.0, 0.0, -1.0], np.ones(count)])
-    limits = np.concatenate([-wobble.asked, wobble.asked + wobble.within])
     bounds = [(None, None)] * 3 + [(0.0, None)] * count
-    best = linprog(cost, np.vstack([late, early]), limits, bounds=bounds)
-    return rows if best.x is None else replace(rows, times=best.x[0] + best.x[1] * step)
+    best = linprog(cost, np.vstack(sides), np.concatenate([-early, late]), bounds=bounds)
+    if best.x is None:
+        return rows
+    return replace(rows, times=best.x[0] + best.x[1] * step, period_s=float(best.x[1]))
 
 
 def _at_one_period(
@@ -538,9 +545,7 @@ def _looped(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | None:
         rows.append(ImuRows(name, loops[name].step_s, wobble.written, due + own * late, (first.rms, fitted.rms), gain))
         ticks.append(own)
         told[name] = (rows_decided(due, own, wobble.asked, wobble.within), (late, ~late))
-    periods = np.array([one.period_s for one in rows])
-    sd = float(np.std(periods, ddof=1) / np.sqrt(periods.size))
-    return ImuClock(float(np.mean(periods)), sd, tuple(rows), True, late_rows_of(np.array(ticks), told))
+    return _clock_of(rows, True, late_rows_of(np.array(ticks), told))
 
 
 def _late_by_phase(wobble: _Wobble, due: FloatArray, tick: float) -> tuple[BoolArray, float]:
@@ -564,29 +569,19 @@ def _late_by_phase(wobble: _Wobble, due: FloatArray, tick: float) -> tuple[BoolA
 def _beside_a_late_loop(wobbles: Mapping[str, _Wobble], comb: ImuClock) -> ImuClock:
     """Return the clock of a chip's own with what the windows of the field's samples say of the loop's late rows."""
     field = {name: _windows(wobble) for name, wobble in wobbles.items()}
-    chip = {one.recording: Windows(field[one.recording].step, one.times, one.period_s) for one in comb.shown}
-    begun = asked_within(field)
-    if begun is None or not begun[0]:
+    loops = loops_with_late_rows(field)
+    if loops is None:
         return comb
-    tick, loops = begun
-    told, ticks = {}, []
-    for name, own in field.items():
-        due = loops[name].instants(own.step)
-        # a wobble's phase leaves open one time that the rows of a recording are all off by
-        made = chip[name].made + late_all_along(due, tick, chip[name])
-        by_chip = rows_decided(due, tick, made, chip[name].period_s)
-        told[name] = (rows_decided(due, tick, own.made, own.period_s), by_chip)
-        alone = asked_within({name: own})
-        ticks.append(tick if alone is None else alone[0])
-    # which rows were late the field tells best: where the chip's windows lie a wobble leaves open
-    found = late_rows_of(np.array(ticks), {name: (by_field, by_field) for name, (by_field, _) in told.items()})
-    agreed = late_rows_of(np.array(ticks), told).agreed
-    # of short ticks few rows are decided by both; that each by itself asks for late rows, and for one tick, tells more
-    needed = [late_needed(one) for one in (field, chip)]
-    if agreed > 0.0 and min(needed)[0] > _ONE_TICK * max(needed)[0]:
-        agreed = max(agreed, min(gain for _, gain in needed))
-    # where none was miscounted the least tick has left so many out, late ones at one end and those on time at the other
-    share = min(max(found.fraction, MISCOUNTED), 1.0 - MISCOUNTED)
-    late, on_time = MISCOUNTED * comb.period_s / share, MISCOUNTED * comb.period_s / (1.0 - share)
-    tick_sd = float(np.hypot(found.tick_sd_s, late))
-    return replace(comb, late=replace(found, tick_s=tick + late + on_time, tick_sd_s=tick_sd, agreed=agreed))
+    shown = [
+        _evenly_between(one, loops.due[one.recording] - one.period_s, loops.due[one.recording] + loops.tick_s)
+        for one in comb.shown
+    ]
+    chip = {one.recording: Windows(field[one.recording].step, one.times, one.period_s) for one in shown}
+    return _clock_of(shown, False, loops.told_by(field, chip))
+
+
+def _clock_of(shown: Sequence[ImuRows], loops: bool, late: LateRows | None = None) -> ImuClock:
+    """Return the clock that the rows of recordings tell, its error by how much their own periods scatter."""
+    own = np.array([one.period_s for one in shown])
+    sd = float(np.std(own, ddof=1) / np.sqrt(own.size))
+    return ImuClock(float(np.mean(own)), sd, tuple(shown), loops, late)

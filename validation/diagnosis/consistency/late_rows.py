@@ -10,7 +10,7 @@ that the total falls behind, while late rows are made up by a shorter one after 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,20 +21,24 @@ from discsim.arrays import BoolArray, FloatArray
 
 __all__ = [
     "MISCOUNTED",
+    "LateLoops",
     "LateRows",
     "Loop",
     "Windows",
     "asked_within",
-    "late_all_along",
-    "late_needed",
+    "even_loop",
     "late_rows_of",
+    "loops_with_late_rows",
     "rows_decided",
 ]
 
 #: share of rows that may have been miscounted: a tick is made no wider for fewer
 MISCOUNTED = 0.01
-#: times that a part may be off by which are tried, within a period to either side
-_TRIED = 201
+#: times by which all rows may have come late that are tried against some that came a tick late
+_TRIED = 301
+#: by how much a loop's step may be off from the written one, of how many steps, and how many phases are tried: 300
+#: steps slip by a twentieth of a step from one to the next
+_LOOP_OFF, _LOOPS, _PHASES = 0.01, 121, 60
 
 
 @dataclass(frozen=True)
@@ -112,41 +116,85 @@ def asked_within(windows: Mapping[str, Windows]) -> tuple[float, dict[str, Loop]
     return float(best.x[0]), loops
 
 
-def late_all_along(due: FloatArray, tick: float, own: Windows) -> float:
-    """Return by how much a part's samples were made later, s, so that as few rows as can be are outside their windows.
+def even_loop(own: Windows, step: float) -> FloatArray:
+    """Return when an even loop of about a ``step``, s, asked for rows (n,), some of which it lost.
 
-    Its times are known but for one time that all of a recording are off by. ``due`` (n,) is when rows were due, s.
+    Each was asked for within a period after the part's newest sample. Where the loop is slower than the part, a window
+    of one period holds one of its instants at the most: of loops all over a step that one counts which misses least.
     """
+    steps = step * np.linspace(1.0 - _LOOP_OFF, 1.0 + _LOOP_OFF, _LOOPS)[:, None]
+    least, found = np.inf, own.made
+    for phase in np.linspace(0.0, 1.0, _PHASES, endpoint=False):
+        first = own.made[0] + phase * steps
+        instants = first + steps * np.ceil((own.made - first) / steps)
+        missed = np.sum(np.maximum(instants - own.made - own.period_s, 0.0), axis=1)
+        best = int(np.argmin(missed))
+        if missed[best] < least:
+            least, found = float(missed[best]), instants[best]
+    return np.asarray(found)
 
-    def outside(more: float) -> float:
-        made = own.made + more
-        late, early = made - due - tick, due - made - own.period_s
-        return float(np.sum(np.maximum(late, 0.0)) + np.sum(np.maximum(early, 0.0)))
 
-    return float(min(np.linspace(-own.period_s, own.period_s, _TRIED), key=outside))
+@dataclass(frozen=True)
+class LateLoops:
+    """Even loops some of whose rows came a tick late, s, with its error, and when the rows (n,) of each were due, s."""
+
+    tick_s: float
+    tick_sd_s: float
+    due: Mapping[str, FloatArray]
+
+    def told_by(self, field: Mapping[str, Windows], chip: Mapping[str, Windows]) -> LateRows:
+        """Return what the windows of the field's samples say of late rows, and how surely those of a chip say so, too.
+
+        Of a short tick few rows are decided by both. That they do not contradict one another, and each by itself asks
+        for rows that came late, tells more.
+        """
+        told = {name: (self._decided(name, own), self._decided(name, chip[name])) for name, own in field.items()}
+        ticks = np.array([self.tick_s])
+        # which rows were late the field tells best: its samples are counted first
+        found = late_rows_of(ticks, {name: (by_field, by_field) for name, (by_field, _) in told.items()})
+        agreed = late_rows_of(ticks, told).agreed
+        if agreed > 0.0:
+            agreed = max(agreed, min(self._gain(one) for one in (field, chip)))
+        return replace(found, tick_sd_s=self.tick_sd_s, agreed=agreed)
+
+    def _decided(self, name: str, own: Windows) -> tuple[BoolArray, BoolArray]:
+        return rows_decided(self.due[name], self.tick_s, own.made, own.period_s)
+
+    def _gain(self, windows: Mapping[str, Windows]) -> float:
+        """Return what a part's windows gain by late rows, in twice the log likelihood.
+
+        Against a loop whose rows all came as late as suits most of them: a row is outside its window once in a hundred,
+        late with the share of the rows that are decided, and free where its window holds both.
+        """
+        counts = np.sum([[np.count_nonzero(one) for one in self._decided(*item)] for item in windows.items()], axis=0)
+        begin = np.concatenate([own.made - self.due[name] for name, own in windows.items()])
+        end = np.concatenate([own.made + own.period_s - self.due[name] for name, own in windows.items()])
+        outside = int(np.count_nonzero((begin > self.tick_s) | (end < 0.0)))
+        more = self.tick_s * np.linspace(-1.0, 2.0, _TRIED)[:, None]
+        alike = int(np.min(np.count_nonzero((begin > more) | (end < more), axis=1)))
+        told = float(np.sum(xlogy(counts, counts / max(float(np.sum(counts)), 1.0))))
+        return 2.0 * (told + (outside - alike) * float(np.log(MISCOUNTED)))
 
 
-def late_needed(windows: Mapping[str, Windows]) -> tuple[float, float]:
-    """Return the tick, s, by which a part's own windows say that rows came late, and what they gain by it.
+def loops_with_late_rows(field: Mapping[str, Windows]) -> LateLoops | None:
+    """Return the even loops that the windows of a part ask for, with late rows; None where no row came late.
 
-    In twice the log likelihood, against a loop whose rows all came as late as suits most of them: a row is outside its
-    window once in a hundred, late with the share of the rows that are decided, and free where its window holds both.
+    The least tick has left one row in a hundred outside, late ones at one end and those on time at the other: if none
+    was miscounted, it is too short by the time in which so many begin.
     """
-    begun = asked_within(windows)
+    begun = asked_within(field)
     if begun is None or not begun[0]:
-        return 0.0, 0.0
+        return None
     tick, loops = begun
-    first, last, counts = [], [], np.zeros(2)
-    for name, own in windows.items():
-        due = loops[name].instants(own.step)
-        counts += [np.count_nonzero(one) for one in rows_decided(due, tick, own.made, own.period_s)]
-        first.append(own.made - due)
-        last.append(own.made + own.period_s - due)
-    begin, end = np.concatenate(first), np.concatenate(last)
-    outside = int(np.count_nonzero((begin > tick) | (end < 0.0)))
-    alike = min(int(np.count_nonzero((begin > more) | (end < more))) for more in np.linspace(0.0, tick, _TRIED))
-    told = float(np.sum(xlogy(counts, counts / max(float(np.sum(counts)), 1.0))))
-    return tick, 2.0 * (told + (outside - alike) * float(np.log(MISCOUNTED)))
+    due = {name: loops[name].instants(own.step) for name, own in field.items()}
+    least = LateLoops(tick, 0.0, due)
+    share = least.told_by(field, field).fraction
+    period = max(own.period_s for own in field.values())
+    late, on_time = (MISCOUNTED * period / max(one, MISCOUNTED) for one in (share, 1.0 - share))
+    alone = [asked_within({name: own}) for name, own in field.items()]
+    spread = float(np.std([tick if one is None else one[0] for one in alone], ddof=1) / np.sqrt(len(alone)))
+    due = {name: one - on_time for name, one in due.items()}
+    return LateLoops(tick + late + on_time, float(np.hypot(spread, late)), due)
 
 
 def rows_decided(due: FloatArray, tick: float, made: FloatArray, period: float) -> tuple[BoolArray, BoolArray]:
