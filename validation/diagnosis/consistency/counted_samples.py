@@ -354,7 +354,7 @@ def unslipped(field: Field, found: Counted, period: float, *, means: bool, kept:
         for k in found.doubtful:
             places += [k, k + 1]
         tried = []
-        for k in sorted(set(np.clip(places, 1, found.newest.size - 1).tolist())):
+        for k in np.unique(np.clip(places, 1, found.newest.size - 1)):
             for more in (-1, 1):
                 newest = found.newest.copy()
                 newest[k:] += more

@@ -184,16 +184,16 @@ class _Wobble:
 
     def columns(self, t: FloatArray) -> tuple[ComplexArray, int]:
         """Return the columns (n, p) at times (n,), and how many of them are the wobble's."""
-        start, end = self.asked[0] - 2.0 * self.within, self.asked[-1] + 2.0 * self.within
-        psi = self.turned(t) - self.turned(0.0)
+        start, end = self._span
+        psi = self._turned_since_first(t)
         fast = np.exp(1j * self.order * psi)[:, None] * slow_columns(t - start, end - start, _KNOTS_S)
         slow = slow_columns(t - start, end - start, _SLOW_S)
         return np.hstack([fast, slow, np.exp(-1j * psi)[:, None] * slow]), fast.shape[1]
 
     def reads(self, t: FloatArray, x: ComplexArray) -> ComplexArray:
         """Return what the columns with coefficients (p,) are at times of any shape."""
-        start, end = self.asked[0] - 2.0 * self.within, self.asked[-1] + 2.0 * self.within
-        psi = self.turned(t) - self.turned(0.0)
+        start, end = self._span
+        psi = self._turned_since_first(t)
         fast, still, carried = np.split(x, np.cumsum([slow_count(end - start, knots) for knots in (_KNOTS_S, _SLOW_S)]))
         return np.asarray(
             np.exp(1j * self.order * psi) * slow_sum(t - start, end - start, _KNOTS_S, fast)
@@ -206,10 +206,18 @@ class _Wobble:
 
         Beside the spin it turns by what its slow amplitude does: air and tilt precess a disc by some per cent of that.
         """
-        start, end = self.asked[0] - 2.0 * self.within, self.asked[-1] + 2.0 * self.within
-        psi = self.turned(t) - self.turned(0.0)
-        slow = np.exp(1j * self.order * psi) * slow_sum(t - start, end - start, _KNOTS_S, x, slope=True)
+        start, end = self._span
+        slope = slow_sum(t - start, end - start, _KNOTS_S, x, slope=True)
+        slow = np.exp(1j * self.order * self._turned_since_first(t)) * slope
         return np.asarray(1j * self.order * self.spin(t) * turning + slow)
+
+    @property
+    def _span(self) -> tuple[float, float]:
+        """Times between which the splines lie, s: a row shows nothing from beyond them."""
+        return float(self.asked[0] - 2.0 * self.within), float(self.asked[-1] + 2.0 * self.within)
+
+    def _turned_since_first(self, t: FloatArray) -> FloatArray:
+        return np.asarray(self.turned(t) - self.turned(0.0))
 
 
 def _wobble_of(recording: Recording, shown: SamplesShown, period: float) -> _Wobble | None:
@@ -553,7 +561,7 @@ def _late_by_phase(wobble: _Wobble, due: FloatArray, tick: float) -> tuple[BoolA
     late = wobble.asked > due
     for _ in range(_ROUNDS):
         fitted = _fit(wobble, due + tick * late)
-        reads = [wobble.columns(due + tick * one)[0] @ fitted.x for one in (0.0, 1.0)]
+        reads = [wobble.reads(due + tick * one, fitted.x) for one in (0.0, 1.0)]
         now = np.abs(wobble.value - reads[1]) < np.abs(wobble.value - reads[0])
         off, weight = fitted.told - due - tick * late, fitted.weight
         more = 0.0

@@ -9,8 +9,8 @@ that the total falls behind, while late rows are made up by a shorter one after 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,9 @@ _TRIED = 301
 #: by how much a loop's step may be off from the written one, of how many steps, and how many phases are tried: 300
 #: steps slip by a twentieth of a step from one to the next
 _LOOP_OFF, _LOOPS, _PHASES = 0.01, 121, 60
+
+#: rows (n,) that are late, and those that are on time
+Decided = tuple[BoolArray, BoolArray]
 
 
 @dataclass(frozen=True)
@@ -148,16 +151,15 @@ class LateLoops:
         Of a short tick few rows are decided by both. That they do not contradict one another, and each by itself asks
         for rows that came late, tells more.
         """
-        told = {name: (self._decided(name, own), self._decided(name, chip[name])) for name, own in field.items()}
-        ticks = np.array([self.tick_s])
+        told = [(self._decided(name, own), self._decided(name, chip[name])) for name, own in field.items()]
         # which rows were late the field tells best: its samples are counted first
-        found = late_rows_of(ticks, {name: (by_field, by_field) for name, (by_field, _) in told.items()})
-        agreed = late_rows_of(ticks, told).agreed
+        share, error = _share(by_field for by_field, _ in told)
+        agreed = _agreed(told)
         if agreed > 0.0:
             agreed = max(agreed, min(self._gain(one) for one in (field, chip)))
-        return replace(found, tick_sd_s=self.tick_sd_s, agreed=agreed)
+        return LateRows(self.tick_s, self.tick_sd_s, share, error, agreed)
 
-    def _decided(self, name: str, own: Windows) -> tuple[BoolArray, BoolArray]:
+    def _decided(self, name: str, own: Windows) -> Decided:
         return rows_decided(self.due[name], self.tick_s, own.made, own.period_s)
 
     def _gain(self, windows: Mapping[str, Windows]) -> float:
@@ -187,8 +189,7 @@ def loops_with_late_rows(field: Mapping[str, Windows]) -> LateLoops | None:
         return None
     tick, loops = begun
     due = {name: loops[name].instants(own.step) for name, own in field.items()}
-    least = LateLoops(tick, 0.0, due)
-    share = least.told_by(field, field).fraction
+    share, _ = _share(rows_decided(due[name], tick, own.made, own.period_s) for name, own in field.items())
     period = max(own.period_s for own in field.values())
     late, on_time = (MISCOUNTED * period / max(one, MISCOUNTED) for one in (share, 1.0 - share))
     alone = [asked_within({name: own}) for name, own in field.items()]
@@ -197,7 +198,7 @@ def loops_with_late_rows(field: Mapping[str, Windows]) -> LateLoops | None:
     return LateLoops(tick + late + on_time, float(np.hypot(spread, late)), due)
 
 
-def rows_decided(due: FloatArray, tick: float, made: FloatArray, period: float) -> tuple[BoolArray, BoolArray]:
+def rows_decided(due: FloatArray, tick: float, made: FloatArray, period: float) -> Decided:
     """Return which rows (n,) a part says were late, and which were on time; it is silent on the others.
 
     ``due`` (n,) is when they were due, ``made`` (n,) when the part's newest sample was made, s.
@@ -207,25 +208,28 @@ def rows_decided(due: FloatArray, tick: float, made: FloatArray, period: float) 
     return late & ~on_time, on_time & ~late
 
 
-def late_rows_of(
-    ticks: FloatArray, told: Mapping[str, tuple[tuple[BoolArray, BoolArray], tuple[BoolArray, BoolArray]]]
-) -> LateRows:
+def late_rows_of(ticks: FloatArray, told: Mapping[str, tuple[Decided, Decided]]) -> LateRows:
     """Return what rows are late by, from each recording's own tick (k,) s, and which rows two sensors tell.
 
     ``told`` are each recording's rows that are late and on time, by the magnetometer and by another sensor, whose word
     counts where they differ.
     """
-    late = on_time = 0
-    table = np.zeros((2, 2))
-    for field, other in told.values():
-        late += int(np.count_nonzero(other[0] | (field[0] & ~other[1])))
-        on_time += int(np.count_nonzero(other[1] | (field[1] & ~other[0])))
-        table += [[np.count_nonzero(a & b) for b in other] for a in field]
-    count = max(late + on_time, 1)
-    share = late / count
-    error = float(np.sqrt(max(share * (1.0 - share), 1.0 / count) / count))
+    share, error = _share([(b[0] | (a[0] & ~b[1]), b[1] | (a[1] & ~b[0])) for a, b in told.values()])
     spread = float(np.std(ticks, ddof=1) / np.sqrt(ticks.size)) if ticks.size > 1 else float("nan")
-    return LateRows(float(np.mean(ticks)), spread, share, error, _beyond_chance(table))
+    return LateRows(float(np.mean(ticks)), spread, share, error, _agreed(told.values()))
+
+
+def _share(decided: Iterable[Decided]) -> tuple[float, float]:
+    """Return the share of rows that are late, of those that are decided, and its error."""
+    late, on_time = np.sum([[np.count_nonzero(one) for one in rows] for rows in decided], axis=0)
+    count = max(int(late + on_time), 1)
+    share = float(late) / count
+    return share, float(np.sqrt(max(share * (1.0 - share), 1.0 / count) / count))
+
+
+def _agreed(told: Iterable[tuple[Decided, Decided]]) -> float:
+    """Return twice the log likelihood by which two sensors tell the same rows late, beyond chance."""
+    return _beyond_chance(np.sum([[[np.count_nonzero(a & b) for b in by[1]] for a in by[0]] for by in told], axis=0))
 
 
 def _beyond_chance(table: FloatArray) -> float:

@@ -230,7 +230,8 @@ def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Ro
     gain = _total(single) - _total(means)
     kept = _kept_rows(fields, rows)
     if kept is not None and (gains := min(_total(single), _total(means)) - _total(kept[1])) >= PRICE * len(fields):
-        return _clock(fields, kept[1], rest, rows, gains, means=kept[0], kept=True)
+        right = _unslipped(fields, kept[1], means=kept[0], kept=True)
+        return _clock(fields, right, rest, rows, gains, means=kept[0], kept=True)
     newest, periods = ({n: one.newest for n, one in single.items()}, {n: one.period for n, one in single.items()})
     loops = loops_beside(newest, periods, float(np.median([field.row_s for field in fields.values()])))
     skips = 0.0 if loops is None else loops.gain
@@ -294,7 +295,6 @@ def _clock(
     Takes what is left of each field, ``rest``, where rows last whole ticks. Rows show ``means`` of two samples, or
     ``loops`` may tell the clock by what they skip; ``kept`` tells that none is lost.
     """
-    counted = _unslipped(fields, counted, means=means, kept=kept)
     periods = {name: one.period for name, one in counted.items()}
     shown = []
     for name, field in fields.items():
