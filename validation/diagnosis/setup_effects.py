@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import approx_fprime
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
@@ -268,23 +269,38 @@ class _Refined:
     errors: tuple[float | None, ...]
 
 
+#: over which the slopes of a fault's numbers are taken, rad: halfway between round-off and their curvature
+_STEP = 1e-6
+
+
 def _refined(fault: Effect, fit: Fit) -> _Refined:
+    """Return a fault with its numbers as a fit has them, and the errors of these.
+
+    A turn goes on from the one that was corrected: its error about one axis is an error of all three numbers.
+    """
     places = {q.name: k for k, q in enumerate(fit.parameters) if q.group == fault.id}
     names = row(fault.id).parameters
     if not names or not places:
         return _Refined(fault, ())
     at = [places[name] for name in names]
     moved = fit.at[at]
-    covariance = _covariance_of(fit, fault.id, names)
-    sd = np.full(len(at), np.inf) if covariance is None else np.sqrt(np.maximum(np.diag(covariance), 0.0))
     first = np.array(_numbers(fault.value))
-    if fault.id == _TURNED:
-        # the fit turned what was corrected: readings = (R_fit C)^T (vector in B)
-        total = (Rotation.from_rotvec(moved) * Rotation.from_rotvec(first)).as_rotvec()
-    elif fault.row.type is SiteField:
-        total = np.array([first[0] + moved[0], first[1] + moved[1], first[2] * moved[2]])
-    else:
-        total = first + moved
+
+    def composed(more: FloatArray) -> FloatArray:
+        """Return the numbers of the fault with what the fit had of it beside the corrected recordings."""
+        if fault.id == _TURNED:
+            # the fit turned what was corrected: readings = (R_fit C)^T (vector in B)
+            return np.asarray((Rotation.from_rotvec(more) * Rotation.from_rotvec(first)).as_rotvec())
+        if fault.row.type is SiteField:
+            return np.array([first[0] + more[0], first[1] + more[1], first[2] * more[2]])
+        return np.asarray(first + more)
+
+    total = composed(moved)
+    covariance = _covariance_of(fit, fault.id, names)
+    sd = np.full(len(at), np.inf)
+    if covariance is not None:
+        slopes = approx_fprime(moved, composed, _STEP)
+        sd = np.sqrt(np.maximum(np.diag(slopes @ covariance @ slopes.T), 0.0))
     room = _SIGMA[fault.row.type]
     errors = tuple(float(one) if one < _UNDETERMINED * room else None for one in sd)
     return _Refined(effect(fault.id, **dict(zip(names, total.tolist(), strict=True))), errors)
