@@ -108,9 +108,12 @@ def test_the_fields_clock_beside_a_chips_own_is_free_and_both_periods_follow_it(
     """Whole numbers hold one comb to the other: 0.015 % of that bent a motion by more than all that was concealed."""
     chip = ImuClock(0.0091, 1e-6, (), False)
     found = replace(counted(), imu=chip)
-    scale, beside, offset = found.free
+    scale, beside, offset, *placed = found.free
     assert (scale.key, beside.key) == (("clock.rate", "ratio"), ("mag.clock_rate", "ratio"))
     assert offset.key == ("mag.time_offset", "offset_s")
+    # its samples are placed in each recording for itself, which bent the periods by up to five of their errors
+    assert [one.recordings for one in placed] == [{k} for k in range(len(NAMES))]
+    assert {(one.key, one.sigma) for one in placed} == {(("gyro.time_offset", "offset_s"), 3e-4)}
     # a quarter of a sample at the end of the shorter of the recordings
     assert beside.sigma == pytest.approx(0.25 / min(shown.newest[-1] for shown in found.clock.shown), rel=0.3)
     covariance = np.array([[4e-10, -3e-10], [-3e-10, 4e-10]])
