@@ -69,13 +69,25 @@ def recordings_of(datasets: Sequence[Sequence[Recording]]) -> tuple[Recording, .
 def recording_names(datasets: Sequence[Sequence[Recording]], names: Sequence[str]) -> list[list[str]]:
     """Return what the answer calls each recording: its folder's name, after its set's and a slash if there are several.
 
-    A recording that no folder holds goes by its own name.
+    A recording that no folder holds goes by its own name. One whose name is taken has its number in the data set
+    behind it.
     """
     several = len(names) > 1
     return [
-        [f"{name}/{_folder(recording)}" if several else _folder(recording) for recording in dataset]
+        [f"{name}/{own}" if several else own for own in _each_its_own([_folder(recording) for recording in dataset])]
         for name, dataset in zip(names, datasets, strict=True)
     ]
+
+
+def _each_its_own(names: Sequence[str]) -> list[str]:
+    """Return names of which no two are the same, with a number behind those that were."""
+    found: list[str] = []
+    for number, name in enumerate(names, 1):
+        own = name
+        while own in found or (own != name and own in names):
+            own = f"{own}-{number}"
+        found.append(own)
+    return found
 
 
 def _folder(recording: Recording) -> str:

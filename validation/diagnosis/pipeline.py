@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from discsim.effects.own import UserEffect
-from discsim.effects.sensors import DroppedSamples
-from discsim.effects.setup import Axes, BoardRotation, TimeOffset
 from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
@@ -36,15 +33,10 @@ from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import Anew, search
 from discsim.validation.diagnosis.selection.turned_or_iron import with_iron_weighed
-from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
-from discsim.validation.diagnosis.setup_effects import (
-    free_parameters,
-    with_other_sensor,
-    with_reversed_axes,
-    with_those_borne_out,
-    without_faults,
-)
+from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_turned_board
+from discsim.validation.diagnosis.setup_effects import free_parameters
 from discsim.validation.diagnosis.stages import Prepared, Question, Tried
+from discsim.validation.diagnosis.suppositions import SUPPOSITIONS, Supposition
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw, LawOfAll, find_law, one_more_does_as_well
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
@@ -53,7 +45,7 @@ from discsim.validation.identification.plants import plant_of
 from discsim.validation.identification.plants.plan import Plan
 from discsim.validation.identification.stated_parameters import stated_parameters
 
-__all__ = ["diagnose"]
+__all__ = ["diagnose", "prepared_under", "tried_under", "tried_with", "under_suppositions"]
 
 
 # far from the data a motion may run beyond all numbers, in a search and in what is told of its answer
@@ -71,7 +63,8 @@ def diagnose(
 
     ``datasets`` are sets of recordings that share their hardware, ``names`` what to call the sets; ``progress`` is
     called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's. ``plans`` are the
-    recordings that could be made where effects cannot be told apart, by default such as are made easily.
+    recordings that could be made where effects cannot be told apart, by default such as are made easily. Raises
+    `InputError` where recordings cannot be diagnosed, which names what is wrong with which.
     """
     recordings = recordings_of(datasets)
     called = tuple(name for group in recording_names(datasets, names) for name in group)
@@ -79,11 +72,7 @@ def diagnose(
     with told_to(progress):
         progress("checking the setup", 0, 5)
         tried = tried_with(_prepared_first(question), question)
-        for suppose, stands in _SUPPOSITIONS:
-            supposed = suppose(tried, question)
-            if supposed is not None:
-                again = tried_under(supposed, question)
-                tried = again if stands(again, tried) else tried
+        tried = under_suppositions(tried, question)
         tried = _with_numbers(_with_law_of_one(tried, question), question)
         if tried.found is not None and tried.law is None:
             tried = replace(tried, found=with_instants_weighed(without_refuted(tried.found)))
@@ -93,6 +82,23 @@ def diagnose(
 def tried_under(setup: SetupFindings, question: Question) -> Tried:
     """Return recordings tried under a setup: effects are searched, unless their sensors contradict one another."""
     return tried_with(prepared_under(setup, question), question)
+
+
+def under_suppositions(tried: Tried, question: Question, suppositions: Sequence[Supposition] = SUPPOSITIONS) -> Tried:
+    """Return what was tried, or tried anew under what it lets one suppose of the setup where that stands.
+
+    Recordings of which nothing is left under a supposition are no ground to give up what was found without it.
+    """
+    for suppose, stands in suppositions:
+        supposed = suppose(tried, question)
+        if supposed is None:
+            continue
+        try:
+            again = tried_under(supposed, question)
+        except InputError:
+            continue
+        tried = again if stands(again, tried) else tried
+    return tried
 
 
 def _with_law_of_one(tried: Tried, question: Question) -> Tried:
@@ -243,105 +249,3 @@ def prepared_under(setup: SetupFindings, question: Question) -> Prepared:
         agreeing = compared(timed, question.names)
     fitted, notes = with_inertia(timed)
     return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), agreeing, agreement, rows)
-
-
-def _follows(tried: Tried, before: Tried) -> bool:
-    """Tell whether sensors do not contradict one another under a supposition, whatever was tried before."""
-    del before
-    return tried.contradiction is None
-
-
-def _follows_as_well(tried: Tried, before: Tried) -> bool:
-    """Tell whether sensors do not contradict one another, and no more than noise is left if nothing more was before."""
-    return _follows(tried, before) and (_explains(tried) or not _explains(before))
-
-
-def _explains(tried: Tried) -> bool:
-    """Tell whether a supposition leaves no more than noise."""
-    return tried.found is not None and not leaves_more_than_noise(tried.found)
-
-
-def _explains_all(tried: Tried, before: Tried) -> bool:
-    """Tell whether a supposition leaves no more than noise, whatever was tried before."""
-    del before
-    return _explains(tried)
-
-
-def _explains_with_less(tried: Tried, before: Tried) -> bool:
-    """Tell whether a supposition leaves no more than noise, with fewer effects than what does so already."""
-    if not _explains(tried):
-        return False
-    sizes = [np.inf if one.found is None else one.found.final.hypothesis.size for one in (tried, before)]
-    return sizes[0] < sizes[1] or not _explains(before)
-
-
-def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose the likeliest fault where sensors contradict one another: other physics may hide it from relations.
-
-    Whether a motion then follows the sensors tells whether it is there.
-    """
-    del question
-    contradiction = tried.contradiction
-    return None if contradiction is None else with_likeliest_fault(tried.prepared.setup, contradiction.blamed)
-
-
-def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose that no sensor's times are off, where corrected times leave more than noise or ask for lost samples.
-
-    Samples that were lost shift a sensor's times, and one offset may make up for most of them.
-    """
-    if tried.found is None:
-        return None
-    late = {fault.effect.row.acts_on for fault in tried.prepared.setup.faults if fault.effect.row.type is TimeOffset}
-    named = [candidate.row for candidate in tried.found.final.hypothesis.candidates]
-    losing = any(row.type is DroppedSamples and row.acts_on in late for row in named)
-    return _without(tried, question, TimeOffset) if losing or not _explains(tried) else None
-
-
-def other_sensor(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose that another sensor is at fault, where one was as likely before the fit and the fit asks for more.
-
-    Of two sensors that are late against each other either may be the one, and of two that turn the other way: the
-    fixes' times, or what an accelerometer shows of a run-down, tell which.
-    """
-    found = tried.found
-    if found is None or (_explains(tried) and not found.final.hypothesis.candidates):
-        return None
-    return with_other_sensor(tried.prepared.setup, question.recordings)
-
-
-def axes_as_written(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose that no board and no axes are turned, where turned ones leave more than noise, or reverse axes again.
-
-    By a strong magnet beside it the field turns over along a low path, as if the board lay upside down. Scales of -1
-    then turn it back.
-    """
-    undone = tried.fit is not None and with_reversed_axes(tried.prepared.setup, tried.fit) is not None
-    return None if _explains(tried) and not undone else _without(tried, question, BoardRotation, Axes)
-
-
-def _without(tried: Tried, question: Question, *types: type[Any]) -> SetupFindings | None:
-    """Return the setup of what was tried without its faults of some types; None if there are no such."""
-    return without_faults(tried.prepared.setup, question.recordings, *types)
-
-
-def reversed_axes(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose axes reversed that a fit has found to read about -1 times what they should."""
-    del question
-    return None if tried.fit is None else with_reversed_axes(tried.prepared.setup, tried.fit)
-
-
-def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose only the faults of a setup that a fit bears out: an effect that it found may have looked like others."""
-    return None if tried.fit is None else with_those_borne_out(tried.prepared.setup, question.recordings, tried.fit)
-
-
-#: what is supposed of the setup once effects were searched, one after the other, and the test of whether it stands
-_SUPPOSITIONS = (
-    (likeliest_fault, _follows),
-    (other_sensor, _explains_with_less),
-    (times_as_written, _explains_all),
-    (axes_as_written, _explains_with_less),
-    (reversed_axes, _follows_as_well),
-    (borne_out, _follows),
-)

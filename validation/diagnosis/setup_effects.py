@@ -299,7 +299,7 @@ def _refined(fault: Effect, fit: Fit) -> _Refined:
     covariance = _covariance_of(fit, fault.id, names)
     sd = np.full(len(at), np.inf)
     if covariance is not None:
-        slopes = approx_fprime(moved, composed, _STEP)
+        slopes = np.reshape(approx_fprime(moved, composed, _STEP), 2 * moved.shape)
         sd = np.sqrt(np.maximum(np.diag(slopes @ covariance @ slopes.T), 0.0))
     room = _SIGMA[fault.row.type]
     errors = tuple(float(one) if one < _UNDETERMINED * room else None for one in sd)

@@ -296,7 +296,8 @@ def contradiction_after(fit: Fit) -> Contradiction | None:
     if not fit.plant.weakly_identified:
         return None
     noise = true_noise([readings for trajectory in fit.trajectories for readings in trajectory.readings])
-    sensors = tuple(name for name in SENSORS if any(r.sensor == name for r in fit.trajectories[0].readings))
+    flown = {readings.sensor for trajectory in fit.trajectories for readings in trajectory.readings}
+    sensors = tuple(name for name in SENSORS if name in flown)
     look = Look(sensors, tuple(range(len(fit.trajectories))), fit, noise, tuple(left_of(fit, noise)))
     if look.follows:
         return None

@@ -35,8 +35,10 @@ from discsim.validation.diagnosis.consistency.phase_regression import (
 from discsim.validation.diagnosis.consistency.skipped_samples import OFF, Loops, loops_beside
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 
-__all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
+__all__ = ["MOST_ROWS", "OwnClock", "SamplesShown", "own_clock_of", "too_many"]
 
+#: most rows of a recording whose samples are counted: a count takes seconds for 1000, and grows with their square
+MOST_ROWS = 1200
 #: a recording that is left with so many times what the best one is may be miscounted somewhere
 _SLIPPED = 1.3
 #: so many rows that no sample makes read as they do a slip leaves at the most, where a motion bends to what follows it
@@ -74,7 +76,8 @@ class SamplesShown:
         if self.none_lost:
             return 0.0
         steps = np.diff(self.newest).sum() - self._skips
-        return float(1.0 - (self.newest.size - 1) / max(steps, 1))
+        # steps are counted by a mean spacing, so that there may seem to be fewer of them than rows
+        return max(float(1.0 - (self.newest.size - 1) / max(steps, 1)), 0.0)
 
     @property
     def _skips(self) -> int:
@@ -209,12 +212,19 @@ class OwnClock:
         }
 
 
+def too_many(rows: Rows) -> bool:
+    """Tell whether rows are too many for their samples to be counted."""
+    return max((own.t.size for own in rows.durations), default=0) > MOST_ROWS
+
+
 def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Rows) -> OwnClock | None:
     """Return the magnetometer's own clock, None where rows that are counted in whole ticks do as well.
 
     Takes recordings, what to call them and the ticks that they come in. Where many rows are means of samples that are
-    no neighbours the tick is half a period, else it is a period.
+    no neighbours the tick is half a period, else it is a period. Rows that are `too_many` are not asked.
     """
+    if too_many(rows):
+        return None
     every = {name: field_of(recording) for recording, name in zip(recordings, names, strict=True)}
     fields = {name: field for name, field in every.items() if field is not None and name in rows.own}
     if not fields:

@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 
-#: length of a segment, s, and the fewest readings of one
+#: length of a segment, s, which is longer where a logger is slow, and the fewest readings of one
 SEGMENT, FEWEST = 0.8, 24
 #: degrees in time of what does not turn, and of the amplitude of what does (a wobble dies), within a segment
 _STILL = 1
@@ -169,7 +169,8 @@ def signal_of(recording: Recording, name: str) -> Signal | None:
 
 
 def _segments(t: FloatArray) -> list[slice]:
-    count = max(1, round((t[-1] - t[0]) / SEGMENT))
+    # of a slow logger a segment lasts as long as its readings are enough
+    count = max(1, min(round((t[-1] - t[0]) / SEGMENT), t.size // (FEWEST + 1)))
     cuts = np.searchsorted(t, np.linspace(t[0], t[-1], count + 1)[1:-1])
     edges = [0, *cuts.tolist(), t.size]
     return [slice(a, b) for a, b in pairwise(edges) if b - a >= FEWEST]
@@ -202,10 +203,13 @@ def rest_of(signal: Signal, psi: FloatArray, ratio: float = 1.0) -> tuple[float,
     return left, total, count
 
 
-def left_of(signal: Signal, psi: FloatArray, ratio: float = 1.0) -> float:
-    """Return the rms of what does not turn with the angle psi (n,), in the sensor's unit, for one axis."""
+def left_of(signal: Signal, psi: FloatArray, ratio: float = 1.0) -> float | None:
+    """Return the rms of what does not turn with the angle psi (n,), in the sensor's unit, for one axis.
+
+    None where there are too few readings to tell.
+    """
     left, _, count = rest_of(signal, psi, ratio)
-    return float(np.sqrt(left / max(count, 1)))
+    return float(np.sqrt(left / count)) if count else None
 
 
 def _still_part(signal: Signal, psi: FloatArray) -> ComplexArray:
@@ -233,9 +237,9 @@ def still_part(signal: Signal, psi: FloatArray, ratio: float) -> ComplexArray:
 
 
 def explained(signal: Signal, psi: FloatArray, ratio: float = 1.0) -> float:
-    """Return the share of what may turn that does turn with the angle psi (n,)."""
-    left, total, _ = rest_of(signal, psi, ratio)
-    return 1.0 - left / max(total, 1e-300)
+    """Return the share of what may turn that does turn with the angle psi (n,); 0 of too few readings to tell."""
+    left, total, count = rest_of(signal, psi, ratio)
+    return 1.0 - left / max(total, 1e-300) if count else 0.0
 
 
 def circle_centre(value: ComplexArray) -> complex:
@@ -313,9 +317,9 @@ def centripetal(recording: Recording) -> Tone | None:
     # whole turns: what turns with the spin averages out
     block = np.floor(turned / 2.0).astype(int)
     ratios = []
-    for number in range(int(block.max())):
-        mine = good & (block == number)
-        if np.count_nonzero(mine) >= 8 and np.count_nonzero(mine) == np.count_nonzero(block == number):
+    order = np.argsort(block, kind="stable")
+    for mine in np.split(order, np.searchsorted(block[order], np.arange(1, int(block.max()) + 1)))[:-1]:
+        if mine.size >= 8 and np.all(good[mine]):
             square = float(np.sum(f[mine] * pull[mine]) / np.sum(pull[mine] ** 2))
             if square > 0:
                 ratios.append(np.sqrt(square))

@@ -21,7 +21,7 @@ from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.imu_clock import ImuClock, imu_clock_of
 from discsim.validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
-from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
+from discsim.validation.diagnosis.consistency.own_clock import MOST_ROWS, OwnClock, own_clock_of, too_many
 from discsim.validation.diagnosis.consistency.phase_regression import (
     REACH,
     angle_turned,
@@ -376,7 +376,9 @@ def _row_proofs(rows: Rows | None, some: Sequence[tuple[Recording, str]]) -> tup
         counted = None if elsewhere is None else rows.counted(recording, name, elsewhere)
         if elsewhere is not None and counted is not None:
             versions = (recording, rows.evenly(recording, name, elsewhere), counted)
-            written, even, at_ticks = (_field_left(version, 0.0)[0] or 0.0 for version in versions)
+            written, even, at_ticks = (_field_left(version, 0.0)[0] for version in versions)
+            if written is None or even is None or at_ticks is None:
+                continue
             left[name] = (elsewhere, (written, even, at_ticks))
             heard = next((item for item in _compared(counted, name) if item.signal == "wobble"), None)
             turns[name] = None if heard is None else (heard.ratio, heard.sd)
@@ -423,19 +425,27 @@ _SAID = {
 }
 
 
+def _verdict_on(some: Sequence[Comparison], reference: str) -> str:
+    """Return what one signal's comparisons with a reference come to, in words."""
+    apart = [item.recording for item in some if not item.agrees]
+    if not apart:
+        return f"agrees with the {reference} about z"
+    if len(apart) == len(some):
+        return f"contradicts the {reference} about z"
+    rest = ", ".join(item.recording for item in some if item.agrees)
+    return f"contradicts the {reference} about z in {', '.join(apart)}, and agrees with it in {rest}"
+
+
 def _sentences(found: Agreement) -> list[str]:
     said = []
     for signal, words in _SAID.items():
         some = [item for item in found.comparisons if item.signal == signal]
         if not some:
             continue
-        verb = "agrees with" if all(item.agrees for item in some) else "contradicts"
+        verdict = _verdict_on(some, found.reference.replace("_", " "))
         timed = "over the written time" if some[0].needs_time else "and no time enters that"
         ratios = ", ".join(f"{item.ratio:.3f} ± {item.sd:.3f} in {item.recording}" for item in some)
-        said.append(
-            f"{words[:1].upper()}{words[1:]} {verb} the {found.reference.replace('_', ' ')} about z: "
-            f"spin over spin is {ratios}, {timed}."
-        )
+        said.append(f"{words[:1].upper()}{words[1:]} {verdict}: spin over spin is {ratios}, {timed}.")
     if found.causes and any(not item.agrees for item in found.comparisons):
         best = found.causes[0]
         held = sum(proof.chi2_before for proof in best.heldout)
@@ -454,6 +464,11 @@ def _sentences(found: Agreement) -> list[str]:
         ]
     if found.rows is not None:
         said += found.rows.sentences
+        if too_many(found.rows):
+            said.append(
+                f"They are more than {MOST_ROWS}, so that it is not asked whether the magnetometer has a clock of its "
+                "own: shorter recordings would tell."
+            )
         said += [
             f"{proof.recording}, with the tick of the others: the field leaves {proof.left[0]:.1f} µT as written, "
             f"{proof.left[1]:.1f} with even rows of the right mean, {proof.left[2]:.1f} with counted rows"

@@ -183,7 +183,7 @@ def rows_of(recordings: Sequence[Recording], names: Sequence[str]) -> Rows | Non
 
 def _gathered(lasted: FloatArray, ticks: FloatArray) -> FloatArray:
     """Return how sharply durations (n,) gather at whole numbers of ticks (k,), the mean cosine of their phase."""
-    return np.asarray(np.mean(np.cos(2.0 * np.pi * lasted[None, :] / ticks[:, None]), axis=1))
+    return np.array([np.mean(np.cos(2.0 * np.pi * lasted / tick)) for tick in ticks])
 
 
 def _measured(found: Sequence[Durations], tick: float) -> tuple[float, float]:

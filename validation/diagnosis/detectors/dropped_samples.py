@@ -14,6 +14,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
 from discsim.validation.diagnosis.detectors.sample_alignment import (
+    ROOM,
     Alignment,
     Losses,
     alignment_of,
@@ -354,7 +355,7 @@ def loses_samples(trajectory: Trajectory, values: Values, readings: Readings, ra
 
     ``sd`` (k,) is the sensor's noise. Few readings tell nothing.
     """
-    if np.count_nonzero(readings.t < float(trajectory.nodes[-1])) < _FEWEST:
+    if np.count_nonzero(readings.t < (1.0 - ROOM) * float(trajectory.nodes[-1])) < _FEWEST:
         return False
     own = alignment_of(trajectory, values, readings, rate_hz, cut=True)
     return lost_in_own_noise(own, sd, _ANY * sd).gain >= DETECTORS.least_dropped

@@ -59,8 +59,10 @@ def _jumps(problem: LocalProblem, kind: type[Any], parts: int) -> tuple[FloatArr
     cell = parts * problem.segment + np.clip(part, 0, parts - 1).astype(int)
     # products of the rows after each instant with the first state's columns
     products = np.zeros((k * parts, d, A.shape[1]))
+    order = np.argsort(cell, kind="stable")
+    bounds = np.searchsorted(cell[order], np.arange(k * parts + 1))
     for i in range(k * parts):
-        rows = A[cell == i]
+        rows = A[order[bounds[i] : bounds[i + 1]]]
         products[i] = rows[:, :d].T @ rows
     after = np.cumsum(products[::-1], axis=0)[::-1]
     instants, gain = np.zeros(k * parts), np.zeros(k * parts)

@@ -20,6 +20,7 @@ from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import Values, delay
 
 __all__ = [
+    "ROOM",
     "alignment_of",
     "circle_through",
     "first_yaw",
@@ -58,8 +59,11 @@ _LEVELS, _SETTLED = 8, 0.95
 _TRIMMED, _FAR_OFF = 3, 4.0
 #: losses that a fit may have overlooked by turning all, and rounds in which counts and the turn follow from one another
 _OVERLOOKED, _TURNS = (0.0, 1.0, -1.0, 2.0, -2.0), 4
+#: share of a sensor's samples that may have been lost, and how many samples by counts a table holds (100 MB), but so
+#: many counts at least: a sensor that stopped early would ask for one of all that might be missing
+_SHARE, _CELLS, _FEWEST_LOST = 0.25, 4_000_000, 64
 #: share of a motion's end at which samples do not count where it ends before they do: as many may be lost
-_ROOM = 0.1
+ROOM = 0.1
 
 
 def viterbi_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> tuple[IntArray, float]:
@@ -233,7 +237,7 @@ def alignment_of(
     much of it as may be lost lies behind each.
     """
     sensor, end = readings.sensor, float(current.nodes[-1])
-    last = len(readings.t) if not cut else int(np.searchsorted(readings.t, (1.0 - _ROOM) * end))
+    last = len(readings.t) if not cut else int(np.searchsorted(readings.t, (1.0 - ROOM) * end))
     t, good, value = readings.t[:last], readings.good[:last], readings.value[:last]
     place = np.asarray(np.round((t - t[0]) * rate_hz), dtype=np.int64)
     if cut:
@@ -244,7 +248,7 @@ def alignment_of(
             first, max(int(np.ceil((_stopped(current.recording, sensor, end) - t[-1]) * rate_hz)), first + 1)
         )
         most = missing.stop
-    most = min(most, int(0.25 * place[-1]) + 8)
+    most = min(most, int(_SHARE * place[-1]) + 8, max(_CELLS // len(place), _FEWEST_LOST))
     grid = t[0] + np.arange(place[-1] + most + 1) / rate_hz
     expected = shown(current, values, sensor, grid - delay(values, sensor, grid))
     if readings.limit is not None:

@@ -84,7 +84,7 @@ def _left(trajectory: Trajectory, values: dict[tuple[str, str], float], sensor: 
         there = at - offset
         inside = (there >= grid[0]) & (there <= grid[-1])
         shifted = np.column_stack([np.interp(there, grid, column) for column in told.T])
-        # where the motion is not known the readings count as they do on the whole
-        squares = np.nansum((value - shifted) ** 2, axis=1)
-        left[k] = float(np.sum(squares[inside])) * used.size / max(int(np.count_nonzero(inside)), 1)
+        # where the motion is not known readings count as they do on the whole; no offset takes most of them there
+        squares, count = np.nansum((value - shifted) ** 2, axis=1), int(np.count_nonzero(inside))
+        left[k] = float(np.sum(squares[inside])) * used.size / count if 2 * count >= used.size else np.inf
     return left

@@ -24,7 +24,7 @@ from discsim.validation.identification.sensor_model import Values, delay
 
 __all__ = ["by_one_sample", "evidence_of_walk", "place_of", "price_of_walk", "sd_of_axes", "walked"]
 
-#: modes of a Brownian motion (Karhunen and Loeve); the others hold 1/(16 pi^2) of its variance each half
+#: modes of a Brownian motion (Karhunen and Loeve); the others hold 1/(8 pi^2) of its variance, 1.3 %
 _MODES = 16
 
 
@@ -103,10 +103,12 @@ def evidence_of_walk(fit: Fit, clock: CandidateEffect) -> float:
 
 
 def _walks(fit: Fit, clock: CandidateEffect, noise: NoiseModel) -> list[_Walk | None]:
-    """Return the walk in each recording; None where the sensor has no readings."""
+    """Return the walk in each recording; None where the sensor has no readings, or its clock is not a slow one."""
     place = place_of(fit, clock)
     assert place is not None
     share = 1.0 - float(fit.at[place])
+    if not 0.0 < share < 1.0:
+        return [None] * len(fit.trajectories)
 
     def one(i: int) -> _Walk | None:
         trajectory = fit.trajectories[i]

@@ -108,9 +108,9 @@ def tried_without(found: Search, candidate: CandidateEffect) -> ContinuousFit:
     rest = final.hypothesis.without(candidate)
     if not rest.candidates:
         return found.base
-    for step in found.steps:
-        if set(step.hypothesis.candidates) == set(rest.candidates):
-            return step
+    tried = [step for step in found.steps if set(step.hypothesis.candidates) == set(rest.candidates)]
+    if tried:
+        return min(tried, key=lambda step: step.score)
     less = continuous_fit(
         found.relaxed_fit, rest, found.own, found.relaxed_noise, values_of_fit(final), iterations=5, polish=1
     )

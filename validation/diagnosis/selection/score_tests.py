@@ -51,6 +51,7 @@ def screened_candidates(
         if equations.recordings > 1 and candidate.told_by_one:
             scopes += [frozenset([i]) for i in range(equations.recordings)]
         best: ScreenedCandidate | None = None
+        most = -np.inf
         for scope in scopes:
             if (candidate.id, scope) in present or (candidate.id, None) in present:
                 continue
@@ -62,8 +63,9 @@ def screened_candidates(
             if backwards(columns, answer):
                 continue
             screened = ScreenedCandidate(scoped, gain, start_of([*rest, *columns], answer, (scoped,)))
-            if best is None or gain > best.gain + (scope_price(equations.recordings) if scope is not None else 0.0):
-                best = screened
+            worth = gain - (0.0 if scope is None else scope_price(equations.recordings))
+            if best is None or worth > most:
+                best, most = screened, worth
         if best is not None:
             found.append(best)
     return sorted(found, key=lambda p: charge(p.candidate) - p.gain)

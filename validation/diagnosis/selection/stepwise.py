@@ -154,7 +154,7 @@ def _selected_forward(found: Search, of_use: int | None, law: Callable[[Search],
         again = _from_there(found, current, better)
         if again is not None:
             # it was not the effect that gained, but where its fit had started: from there the search goes on
-            found = replace(found, final=again, base=again if step == 0 else found.base)
+            found = replace(_with_final(found, again), base=again if step == 0 else found.base)
             continue
         if step >= 1 and far(found, better) and not _nearing(found, current, better):
             # two effects and still far from the data: none of these

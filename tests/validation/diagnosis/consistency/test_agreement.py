@@ -12,9 +12,11 @@ from support.made import MODULE, throws
 from support.places import REAL
 
 from discsim.effects import Effect, effect
-from discsim.recording import Recording, Samples
+from discsim.environment import Environment
+from discsim.recording import Recording, Samples, SensorSheet
 from discsim.validation.diagnosis import diagnose
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, compared, written_ratios
+from discsim.validation.diagnosis.datasets import recording_names
 from discsim.validation.diagnosis.report.consistency_tables import tables_of
 from discsim.validation.importing import find_map, import_recording, read_map
 
@@ -185,3 +187,47 @@ def test_the_throws_of_an_ultimate_disc_agree_once_their_rows_are_counted():
         assert here < min(0.25, 0.3 * counted)
         # the maker takes every row as 10 ms: that is the loop, a fifth of whose steps write no row
         assert shown.loop_s == pytest.approx(0.01, rel=0.01)
+
+
+def slow_field(rate_hz: float, *, noise_only: bool, lost: float = 0.0) -> list[Recording]:
+    """Return spins of 25 and 26 rad/s before a magnetometer of few readings a second; the gyroscope goes with it."""
+
+    def one(k: int) -> Recording:
+        rng = np.random.default_rng(k)
+        true = np.arange(round(6 * rate_hz)) / rate_hz
+        true = true[rng.random(true.size) > lost]
+        t, turned = np.arange(true.size) / rate_hz, (25.0 + k) * true
+        field = np.column_stack([20 * np.cos(turned), -20 * np.sin(turned), np.full(t.size, 40.0)])
+        field = (0.0 if noise_only else 1.0) * field + rng.normal(0.0, 0.3, field.shape)
+        spin = np.column_stack([np.zeros((t.size, 2)), np.full(t.size, 25.0 + k)]) + rng.normal(0.0, 0.01, (t.size, 3))
+        sheets = {"magnetometer": SensorSheet(rate_hz, 0.3), "gyroscope": SensorSheet(rate_hz, 0.01)}
+        samples = {"magnetometer": Samples(t, field), "gyroscope": Samples(t, spin)}
+        return Recording(plant="spin_down", name=f"spin-{k}", environment=Environment(), sheets=sheets, samples=samples)
+
+    return [one(k) for k in range(2)]
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 25.0, 29.0, 31.0])
+def test_the_noise_of_a_slow_magnetometer_contradicts_nothing(rate_hz):
+    """Its segments had too few readings: with none looked at, all of it was said to turn, 1.4 times as fast."""
+    assert not [item for one in compared(slow_field(rate_hz, noise_only=True), ["a", "b"]) for item in one]
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 29.0])
+def test_rows_that_a_slow_logger_lost_are_told_in_numbers(rate_hz):
+    recordings = slow_field(rate_hz, noise_only=False, lost=0.15)
+    found = told(recordings)
+    assert found.rows is not None
+    assert found.rows.tick_s == pytest.approx(1.0 / rate_hz, rel=0.02)
+    for proof in found.row_proofs:
+        written, _, counted, _ = proof.left
+        assert counted < 0.1 * written
+    assert json.loads(json.dumps(found.to_json()))["rows"]["heldout"]
+
+
+def test_recordings_of_one_name_are_told_apart():
+    """Recordings of arrays are all called so: what was counted of one had been taken for the other's."""
+    alike = [replace(one, name="arrays") for one in slow_field(29.0, noise_only=False)]
+    assert recording_names([alike], ["set"]) == [["arrays", "arrays-2"]]
+    other = [*alike, replace(alike[0], name="arrays-2")]
+    assert len(set(recording_names([other], ["set"])[0])) == 3

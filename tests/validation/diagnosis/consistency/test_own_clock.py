@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.logger_loop import LOOP, NAMES, PERIOD, logged, motions
 
 from discsim.validation.diagnosis.consistency.counted_samples import field_of, followed, unslipped
-from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
+from discsim.validation.diagnosis.consistency.own_clock import MOST_ROWS, OwnClock, SamplesShown, own_clock_of, too_many
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
 
 
@@ -78,3 +80,24 @@ def test_rows_are_put_where_their_samples_were_taken():
     behind = (times - times[0]) - (newest[0] - newest[0][0]) * PERIOD
     assert np.quantile(np.abs(behind), 0.95) < 0.55 * PERIOD
     assert clock.counted(recording, "another") is None
+
+
+def test_rows_that_are_too_many_for_their_samples_are_not_asked_for_a_clock():
+    """A count of 2000 rows had taken minutes, and one of ten minutes of a rate table would have taken a day."""
+    recordings = [logged(motion, 1 + k, own_clock=True, weight=0.5)[0] for k, motion in enumerate(motions())]
+    rows = rows_of(recordings, NAMES)
+    assert rows is not None
+    assert not too_many(rows)
+    first, *others = rows.durations
+    long = replace(first, t=np.arange(MOST_ROWS + 1.0))
+    many = replace(rows, durations=(long, *others))
+    assert too_many(many)
+    assert own_clock_of(recordings, NAMES, many) is None
+
+
+@pytest.mark.parametrize("count", range(60, 140, 7))
+def test_no_fewer_than_none_of_the_rows_are_lost_where_steps_are_counted_by_their_mean(count):
+    period = 0.0094
+    newest = np.floor(0.4 + 1.1 * np.arange(count)).astype(int)
+    shown = SamplesShown("a", period, newest, np.zeros_like(newest), (1.0, 1.0), 1.1 * period)
+    assert 0.0 <= shown.lost < 0.02

@@ -24,6 +24,7 @@ from discsim.validation.diagnosis.detectors.dropped_samples import (
     begun_later,
     dropped_accelerometer,
     dropped_magnetometer,
+    loses_samples,
     recounted,
 )
 from discsim.validation.diagnosis.detectors.events import events
@@ -31,6 +32,7 @@ from discsim.validation.diagnosis.detectors.gusts import gusts
 from discsim.validation.diagnosis.detectors.local_problem import LocalProblems, local_problems
 from discsim.validation.diagnosis.detectors.sample_alignment import (
     Alignment,
+    alignment_of,
     lost_along,
     lost_and_turned,
     lost_in_own_noise,
@@ -495,3 +497,37 @@ def test_what_a_fit_tells_of_lost_samples_is_worked_out_once(monkeypatch: pytest
         lost = lost.about(fit, (), lambda: {})
         assert lost.fit is fit
     assert calls == [one, other]
+
+
+def test_a_sensor_that_speaks_only_at_the_end_is_not_late() -> None:
+    """With an offset by which none of its readings lies in the motion nothing was left of them, which gained most."""
+    whole = table()
+    gyroscope = whole.samples["gyroscope"]
+    late = gyroscope.t > gyroscope.t[-1] - 0.25
+    cut = {**whole.samples, "gyroscope": Samples(gyroscope.t[late], gyroscope.value[late])}
+    made = relaxed([replace(whole, samples=cut)])
+    fitted = continuous_fit(made, Hypothesis(), (), shown_noise(made), {})
+    assert time_offsets(fitted.fit, fitted.fit.noise) == []
+
+
+def test_a_sensor_that_begins_at_the_end_of_a_look_tells_of_no_losses() -> None:
+    fit = relaxed_fit()
+    trajectory = fit.trajectories[0]
+    readings = next(r for r in trajectory.readings if r.sensor == "accelerometer")
+    end = float(trajectory.nodes[-1])
+    t = np.linspace(0.95 * end, 1.1 * end, 300)
+    some = np.arange(300) % readings.t.size
+    begun = replace(readings, t=t, value=readings.value[some], good=readings.good[some])
+    assert not loses_samples(trajectory, fit.values(0), begun, 1000.0, np.ones(3))
+
+
+@pytest.mark.parametrize(("count", "most"), [(1000, 257), (6000, 666), (60000, 66)])
+def test_so_many_losses_are_looked_for_as_a_table_of_them_holds(count: int, most: int) -> None:
+    """A sensor of ten minutes that stopped after three quarters had asked for a table of 26 GB."""
+    fit = relaxed_fit()
+    trajectory = fit.trajectories[0]
+    readings = next(r for r in trajectory.readings if r.sensor == "accelerometer")
+    end, some = float(trajectory.nodes[-1]), np.arange(count) % readings.t.size
+    t = np.arange(count) * 0.6 * end / count
+    stopped = replace(readings, t=t, value=readings.value[some], good=readings.good[some])
+    assert alignment_of(trajectory, fit.values(0), stopped, count / (0.6 * end)).most == most

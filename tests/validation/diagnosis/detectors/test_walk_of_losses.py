@@ -14,7 +14,7 @@ from discsim.effects.catalogue import Effect
 from discsim.validation.challenge.blind import Request
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.diagnosis.detectors.dropped_samples import without_losses
-from discsim.validation.diagnosis.detectors.walk_of_losses import price_of_walk, walked
+from discsim.validation.diagnosis.detectors.walk_of_losses import evidence_of_walk, price_of_walk, walked
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
@@ -105,3 +105,16 @@ def test_what_a_clock_leaves_of_losses_is_no_drift_and_no_shift_of_times():
     share = named.parameters["fraction"]
     assert share.sd is not None
     assert share.value == pytest.approx(0.02392, abs=3.0 * share.sd)
+
+
+def test_a_clock_that_is_fast_has_no_walk_whatever_trajectories_hold():
+    """Its share of lost samples is negative: a search asks for the price before it asks whether the clock is slow."""
+    found, fitted = clocked(LOST)
+    (clock,) = fitted.hypothesis.candidates
+    held, _ = walked(fitted.fit, clock, found.relaxed_noise)
+    at = held.at.copy()
+    at[[q.group == clock.id for q in held.parameters].index(True)] = 1.0001
+    fast = replace(held, at=at)
+    assert price_of_walk(fast, clock, found.relaxed_noise) == 0.0
+    assert evidence_of_walk(fast, clock) == 0.0
+    assert walked(fast, clock, found.relaxed_noise) == (fast, 0.0)
