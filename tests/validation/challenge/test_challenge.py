@@ -279,6 +279,7 @@ def test_the_summary_counts_what_a_person_would_count():
         "exponent_within_2sd_rate": (0, 0),
         "heldout_improved_rate": (1, 1),
         "right_setup_rate": (0, 0),
+        "right_setup_rate_where_told_apart": (0, 0),
         "right_verdict_like_real_rate": (0, 0),
         "right_like_real_rate": (0, 0),
         "found_like_real_rate": (0, 0),
@@ -316,6 +317,20 @@ def test_a_setting_is_right_up_to_what_the_recordings_can_tell(found, right):
     score = score_case(FLIPPED, diagnosis("explained", found, located=("magnetometer",)))
     assert score.right is right
     assert summary([(FLIPPED, None, score)])["right_setup_rate"].hits == int(right)
+
+
+def test_what_is_too_small_to_be_told_beside_a_fault_is_not_asked_for():
+    """As elsewhere: below twice the size at which an effect is told from others it may be missed, or named another."""
+    both = answer("setup", effects=("gyro.units", "gyro.lag"), setting={"written_in": "deg/s"})
+    units = {**named("gyro.units"), "setting": {"written_in": "deg/s"}}
+    missed = score_case(both, diagnosis("explained", units, located=("gyroscope",)))
+    alone = score_case(FLIPPED, diagnosis("explained", fault("mag.axes", "x -y z"), located=("magnetometer",)))
+    assert not missed.right
+    for size, asked in ((1.9, 1), (2.0, 2)):
+        found = summary([(both, None, missed), (FLIPPED, None, alone)], (size, None), (size, None))
+        assert (found["right_setup_rate"].hits, found["right_setup_rate"].of) == (1, 2)
+        apart = found["right_setup_rate_where_told_apart"]
+        assert (apart.hits, apart.of) == (1, asked)
 
 
 def test_a_fault_beside_a_physical_effect_needs_both():

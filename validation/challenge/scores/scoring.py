@@ -350,6 +350,9 @@ def summary(
     hidden = [s for a, _, s in scored if a.effects]
     unknown = [(d, s) for a, d, s in scored if a.kind == "off_catalogue"]
     real = [(a, s) for a, _, s in scored if a.kind == "like_real"]
+    # a fault with nothing beside it has no size
+    pairs = zip(scored, told or [None] * len(scored), strict=True)
+    faulty = [(size, s) for (a, _, s), size in pairs if a.kind == "setup"]
     errors = [[(d.effect, abs(z)) for d in s.deviations if (z := d.in_sd) is not None] for _, _, s in scored]
     stated = [[z for effect, z in group if effect == RECALIBRATED] for group in errors]
     of_effects = [[z for effect, z in group if effect != RECALIBRATED] for group in errors]
@@ -379,7 +382,8 @@ def summary(
         "exponent_given_rate": rate(s.exponent is not None for a, _, s in scored if has_power_law(a)),
         "exponent_within_2sd_rate": rate(abs(z) <= 2.0 for z in exponents),
         "heldout_improved_rate": rate(gained),
-        "right_setup_rate": rate(s.right for a, _, s in scored if a.kind == "setup"),
+        "right_setup_rate": rate(s.right for _, s in faulty),
+        "right_setup_rate_where_told_apart": rate(s.right for size, s in faulty if size is None or size >= 2.0),
         "right_verdict_like_real_rate": rate(s.right_verdict for _, s in real),
         "right_like_real_rate": rate(s.right for _, s in real),
         "found_like_real_rate": clustered_rate([id in s.named for id in a.effects] for a, s in real),

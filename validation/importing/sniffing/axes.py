@@ -46,6 +46,10 @@ ONE_WAY = 0.9
 AS_WRITTEN = "as the gyroscope's"
 #: Ways to lay the axes are told apart where one leaves this much less than the other, in the ratio's own size.
 APART = 0.8
+#: Noise alone ranks ways that leave no more than this times the least, in a log of 300 rows and more.
+SAME = 1.02
+#: How magnetometers lie on the gyroscope of their package by its data sheet: in an ICM-20948, in an MPU-9250.
+OF_PARTS = ("x -y -z", "y x -z")
 #: Share of the readings in a spin that stand at one limit, above which a gyroscope tells no rate but that it is faster.
 CLIPPED = 0.5
 
@@ -187,6 +191,7 @@ def _laid(sensors: Mapping[str, Reading3], spin: int | None) -> _Laid:
     named = " ".join(letters(chosen.axes))
     left = next(f.ratio for f in fits if np.array_equal(f.axes, np.eye(3)))
     why = f"{100 * chosen.ratio:.0f} % of the field's changes are left, {100 * left:.0f} % if they lay as written{by}"
+    why += "" if len(alike) <= 2 else f"; {len(alike) - 1} other ways fit as well"
     decision = Decision(what, f"{named} in the gyroscope's", "likely" if len(alike) <= 2 else "guess", why)
     return _Laid(chosen.axes, decision, MIRRORED if np.linalg.det(chosen.axes) < 0 else "")
 
@@ -251,11 +256,14 @@ def _of_two(alike: list[Fit], field: Reading3, accel: Reading3 | None) -> tuple[
 
     North of the equator, where nine people of ten live, the field points down.
     """
+    least = min(fit.overall for fit in alike)
+    same = [fit for fit in alike if fit.overall <= SAME * least]
     ranked = sorted(
-        alike, key=lambda fit: (round(fit.overall, 2), np.linalg.det(fit.axes) < 0, -float(np.trace(fit.axes)))
+        same,
+        key=lambda fit: (np.linalg.det(fit.axes) < 0, " ".join(letters(fit.axes)) not in OF_PARTS, -np.trace(fit.axes)),
     )
-    best = min(ranked, key=lambda fit: fit.overall * (1.0 if np.linalg.det(fit.axes) > 0 else 1.001))
-    pair = [fit for fit in ranked if np.array_equal(fit.axes, best.axes) or np.array_equal(fit.axes, -best.axes)]
+    best = ranked[0]
+    pair = [fit for fit in alike if np.array_equal(fit.axes, best.axes) or np.array_equal(fit.axes, -best.axes)]
     if accel is None or len(pair) < 2:
         return best, ""
     still = resting(accel, None)

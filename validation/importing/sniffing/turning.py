@@ -58,9 +58,9 @@ class Steps:
 class Fit(NamedTuple):
     """What is left of the vector's changes (a ratio: 0 all explained, 1 nothing), by which axes, worth, offset.
 
-    ``overall`` is the geometric mean of what is left over all of `LAGS`, by which ways are ranked. ``size`` is that of
-    the vector without its offset, over that of what is read. ``sharp``: by the turns alone a worth that is a quarter
-    larger or smaller explains much less; else it rests on that size.
+    ``overall`` is the geometric mean of what is left over all steps of `LAGS`, by which ways are ranked. ``size`` is
+    that of the vector without its offset, over that of what is read. ``sharp``: by the turns alone
+    a worth that is a quarter larger or smaller explains much less; else it rests on that size.
     """
 
     ratio: float
@@ -139,39 +139,77 @@ def _rotations(turn: FloatArray) -> FloatArray:
     return found
 
 
-def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
-    """Return what a worth leaves of the vector's changes, by each of some ways W (3, 3) to lay its axes.
+@dataclass(frozen=True)
+class _Sums:
+    """What steps say of some ways W (w) to lay a vector's axes: sums of squares over all steps, by W and an offset.
 
     A way enters linearly: W a - R W b of vectors a after and b before a rotation R is ``parts`` times W's elements, so
-    that sums of squares over all steps are taken once for all ways.
+    that sums are taken once for all ways. ``own`` (w,) are the squares without an offset, ``normal`` (3, 3) and
+    ``seen_by`` (3, w) what an offset changes of them. ``change`` is the rms change of a component, ``count`` how many
+    there are; ``before`` (k, 3) are the vectors before the steps.
     """
+
+    ways: Sequence[FloatArray]
+    own: FloatArray
+    normal: FloatArray
+    seen_by: FloatArray
+    change: float
+    count: int
+    before: FloatArray
+
+    def offset(self) -> FloatArray:
+        """Return the offset (3, w) that leaves least by each way, no larger than one can be."""
+        return _offset(self.normal, self.seen_by, self.limit)
+
+    @property
+    def limit(self) -> float:
+        """The largest offset that can be."""
+        return OFFSET * float(np.max(np.linalg.norm(self.before, axis=1)))
+
+    def left(self, offset: FloatArray) -> FloatArray:
+        """Return what is left of the changes (w,) by each way with its offset (3, w), as a ratio."""
+        squares = (
+            self.own - 2.0 * np.sum(offset * self.seen_by, axis=0) + np.sum(offset * (self.normal @ offset), axis=0)
+        )
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0) / self.count) / self.change)
+
+    def size(self, offset: FloatArray) -> FloatArray:
+        """Return the size of the vector without an offset (3, w), over that of what is read, by each way (w,)."""
+        sizes = np.linalg.norm(self.before, axis=1)
+        back = np.stack([way.T @ one for way, one in zip(self.ways, offset.T, strict=True)], axis=1)
+        lengths = sizes[:, None] ** 2 - 2.0 * self.before @ back + np.sum(offset**2, axis=0)
+        return np.asarray(np.sqrt(np.maximum(np.median(lengths, axis=0), 0.0)) / (float(np.median(sizes)) or 1.0))
+
+
+def _offset(normal: FloatArray, seen_by: FloatArray, limit: float) -> FloatArray:
+    # squared, what a singular value of 1e-3 of the largest is
+    offset = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ seen_by
+    return np.asarray(offset * np.minimum(1.0, limit / np.maximum(np.linalg.norm(offset, axis=0), 1e-300)))
+
+
+def _sums(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> _Sums | None:
+    """Return what steps say of some ways with a worth of the gyroscope's reading; None where few of them tell."""
     chosen = _chosen(steps, worth)
     if chosen is None:
-        return []
+        return None
     before, after, turn = chosen
     rotation = _rotations(turn * worth)
     design = (np.eye(3) - rotation).reshape(-1, 3)
-    normal = design.T @ design
     change = float(np.sqrt(np.mean((after - before) ** 2))) or 1.0
-    sizes = np.linalg.norm(before, axis=1)
-    limit, usual = OFFSET * float(np.max(sizes)), float(np.median(sizes)) or 1.0
     elements = np.stack([np.ravel(way) for way in ways], axis=1)
     parts = np.eye(3)[:, :, None] * after[:, None, None, :] - rotation[:, :, :, None] * before[:, None, None, :]
     parts = parts.reshape(-1, 9)
-    seen_by = design.T @ parts @ elements
-    # squared, what a singular value of 1e-3 of the largest is
-    offset = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ seen_by
-    offset *= np.minimum(1.0, limit / np.maximum(np.linalg.norm(offset, axis=0), 1e-300))
-    squares = (
-        np.sum(elements * (parts.T @ parts @ elements), axis=0)
-        - 2.0 * np.sum(offset * seen_by, axis=0)
-        + np.sum(offset * (normal @ offset), axis=0)
-    )
-    ratios = np.sqrt(np.maximum(squares, 0.0) / len(design)) / change
-    turned_back = np.stack([way.T @ one for way, one in zip(ways, offset.T, strict=True)], axis=1)
-    lengths = sizes[:, None] ** 2 - 2.0 * before @ turned_back + np.sum(offset**2, axis=0)
-    seen = np.sqrt(np.maximum(np.median(lengths, axis=0), 0.0)) / usual
-    found = zip(ratios.tolist(), ways, offset.T, seen.tolist(), strict=True)
+    own = np.sum(elements * (parts.T @ parts @ elements), axis=0)
+    return _Sums(ways, own, design.T @ design, design.T @ parts @ elements, change, len(design), before)
+
+
+def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
+    """Return what a worth leaves of the vector's changes, by each of some ways W (3, 3) to lay its axes."""
+    sums = _sums(steps, worth, ways)
+    if sums is None:
+        return []
+    offset = sums.offset()
+    found = zip(sums.left(offset).tolist(), ways, offset.T, sums.size(offset).tolist(), strict=True)
     return [Fit(ratio, way, worth, one, size=max(size, 1e-6)) for ratio, way, one, size in found]
 
 
@@ -217,10 +255,22 @@ def best_axes(steps: Sequence[Steps], worth: float) -> list[Fit]:
     """Return the fits of all 48 ways to lay the vector's axes on the gyroscope's, the best first.
 
     Each is the fit of the lag that it explains best; ranks are over all lags, as a slow turn shows in a long one only.
+    A lag counts by its steps, for in a fast spin few of a long one are left, those of the hand and of the catch. The
+    offset is one for all lags: so few steps alone ask for any.
     """
-    each = [fits for one in steps if (fits := _fits(one, worth, PERMUTATIONS))]
+    each = [sums for one in steps if (sums := _sums(one, worth, PERMUTATIONS)) is not None]
+    if not each:
+        return []
+    # lags count by what the best way leaves of each
+    least = [max(float(np.min(sums.left(sums.offset()))) * sums.change, 1e-300) ** -2.0 for sums in each]
+    normal = np.sum([w * sums.normal for w, sums in zip(least, each, strict=True)], axis=0)
+    seen_by = np.sum([w * sums.seen_by for w, sums in zip(least, each, strict=True)], axis=0)
+    offset = _offset(normal, seen_by, min(sums.limit for sums in each))
+    left = np.array([sums.left(offset) for sums in each])
+    share = np.array([sums.count for sums in each]) / sum(sums.count for sums in each)
+    overall = np.exp(share @ np.log(np.maximum(left, 1e-12)))
     ways = [
-        min(fits, key=lambda fit: fit.ratio)._replace(overall=float(np.exp(np.mean([np.log(f.ratio) for f in fits]))))
-        for fits in zip(*each, strict=True)
+        Fit(float(np.min(left[:, k])), way, worth, offset[:, k], overall=float(overall[k]))
+        for k, way in enumerate(PERMUTATIONS)
     ]
     return sorted(ways, key=lambda fit: fit.overall)
