@@ -13,9 +13,11 @@ from dataclasses import replace
 from discsim.effects.catalogue import catalogued
 from discsim.effects.mount_rows import Mount
 from discsim.effects.sensors import SoftIron
-from discsim.validation.diagnosis.selection.evidence import lead
+from discsim.validation.diagnosis.selection.candidates import free_candidate
+from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.selection.evidence import lead, price
 from discsim.validation.diagnosis.selection.exchange import rival_of
-from discsim.validation.diagnosis.selection.search_state import Search, possible
+from discsim.validation.diagnosis.selection.search_state import Search, possible, values_of_fit
 from discsim.validation.diagnosis.settings import SELECTION
 
 __all__ = ["with_iron_weighed"]
@@ -28,7 +30,7 @@ def with_iron_weighed(found: Search) -> Search:
     """Return a search of which a turned magnetometer or soft iron has the other as its rival, or gives way to it.
 
     The fit that begins with few effects, and turned chips among them, may end beside its optimum with soft iron. The
-    six numbers of that must gain more than single rows that are miscounted leave.
+    six numbers of that must gain more than single rows that are miscounted leave. Where both are, both are named.
     """
     for _ in _IN_PLACE:
         found = found.about(found.final.fit)
@@ -45,4 +47,21 @@ def with_iron_weighed(found: Search) -> Search:
         if rival.worse + lead(rival.candidate, candidate, *told) + odd >= 0.0:
             break
         found = replace(found, final=rival.fitted, rivals={})
-    return found
+    return _with_the_other(found)
+
+
+def _with_the_other(found: Search) -> Search:
+    """Return a search with the other one beside a turned magnetometer or soft iron, where it is worth its price there.
+
+    Of ten sets of throws like real ones with one of the two the other gained 20 at most; where both were, 18 to 79.
+    """
+    final = found.final
+    missing = [other for id, other in _IN_PLACE.items() if any(one.id == id for one in final.hypothesis.candidates)]
+    if len(missing) != 1 or all(one.id != missing[0] for one in found.candidates):
+        return found
+    other = free_candidate(missing[0])
+    both = continuous_fit(final.fit, final.hypothesis.plus(other), found.own, final.fit.noise, values_of_fit(final))
+    both = found.with_cost(both)
+    if not possible(both) or both.gain_upon(final) <= price(other):
+        return found
+    return replace(found, final=both, rivals={})

@@ -21,9 +21,9 @@ from discsim.validation.diagnosis.selection.turned_or_iron import with_iron_weig
 BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)
 
 
-def named(hidden: Effect, id: str) -> Search:
-    """Return a search of two free spins that ends with hard iron and an effect, where another is hidden."""
-    begun = screened(SearchProblem(throws([], [hidden], module=BLIND, plant="free_spin")))
+def named(hidden: Effect, id: str, *more: Effect) -> Search:
+    """Return a search of two free spins that ends with hard iron and an effect, where others are hidden."""
+    begun = screened(SearchProblem(throws([], [hidden, *more], module=BLIND, plant="free_spin")))
     base = begun.base
     hypothesis = Hypothesis((free_candidate("mag.hard_iron"), free_candidate(id)))
     final = continuous_fit(base.fit, hypothesis, begun.own, begun.relaxed_noise, values_of_fit(base))
@@ -48,6 +48,15 @@ def test_a_turned_magnetometer_stays_with_soft_iron_beside_it_that_does_as_well(
     (rival,) = found.rivals["mag.mount"]
     assert rival.candidate.id == "mag.soft_iron"
     assert confusions(found, found.final.hypothesis.candidates[-1]) == [rival]
+
+
+@pytest.mark.parametrize("first", ["mag.mount", "mag.soft_iron"])
+def test_both_are_named_where_both_are(first):
+    iron = effect("mag.soft_iron", sxx=0.03, sxy=-0.02, sxz=0.03, syy=-0.02, syz=0.02, szz=0.0)
+    found = with_iron_weighed(named(iron, first, effect("mag.mount", rx_rad=0.06, ry_rad=-0.05, rz_rad=0.0)))
+    assert ids(found) == {"mag.hard_iron", "mag.mount", "mag.soft_iron"}
+    values = values_of_fit(found.final)
+    assert values[("mag.mount", "rx_rad"), None] == pytest.approx(0.06, abs=0.02)
 
 
 def test_where_neither_is_named_nothing_is_weighed():
