@@ -61,6 +61,11 @@ class Environment:
         """Strength of the field, uT, or None where it is not known."""
         return float(np.linalg.norm(self.magnetic_field)) if self.field_known else None
 
+    @property
+    def field_down(self) -> float | None:
+        """The share of the magnetic field that points down, the sine of its dip; None where it is not known."""
+        return float(self.magnetic_field[2] / self.field_strength) if self.field_known else None
+
     @classmethod
     def from_toml(cls, table: TomlTable, *, air_required: bool) -> Environment:
         """Read an ``[environment]`` table."""

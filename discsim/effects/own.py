@@ -1,6 +1,6 @@
 """Effects of the user's own: one Python file each, checked when it is read. They compete with the catalogue's and fly.
 
-What such a file holds is told in docs/diagnosing.md. A file is code and runs as such: only files of one's own.
+What such a file holds is told in docs/your-own-effect.md. A file is code and runs as such: only files of one's own.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A logger that writes no time makes a row in each step of its loop. What happens to those steps is one pattern for all
 sensors; a part that free-runs hands over its newest sample, so that the age of a reading is a sawtooth. No smooth
-parameter tells the pattern: it is counted row by row before any motion is fitted (docs/diagnosing.md).
+parameter tells the pattern: it is counted row by row before any motion is fitted (docs/diagnosing-method.md).
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from discsim.errors import InputError
 from discsim.motion import State
 from discsim.parameters import PARAMETERS, parameters, tables
 
-PAGE = (ROOT / "docs" / "diagnosing.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "your-own-effect.md").read_text(encoding="utf-8")
 SENSOR, MOTION = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.S) if "NamedTuple" in block)
 
 

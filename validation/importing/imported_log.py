@@ -229,7 +229,7 @@ def import_log(
         decisions: tuple[Decision, ...] = ()
         notes: tuple[str, ...] = ()
         if known is None:
-            screened = sniff(logged, plant)
+            screened = sniff(logged, plant, None if environment is None else environment.field_down)
             screened = screened if environment is None else screened.in_field(environment.field_strength)
             text, decisions, notes = map_text(screened), tuple(screened.all_decisions), tuple(screened.notes)
             write_text(Path(place) / "map.toml", text)

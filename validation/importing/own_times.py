@@ -154,10 +154,12 @@ def own_times(first_shown: FloatArray, written: FloatArray, rows_per_reading: fl
     if np.mean(near) >= ONE_CLOCK:
         return OwnTimes(float(slope), np.asarray(first_shown - late - row / 2), True)
     width = min(NEARBY, first_shown.size // 2 * 2 - 1)
-    padded = np.pad(late, width // 2, mode="reflect", reflect_type="odd")
+    # the first reading may stand since long before the first row, as where a throw is cut out of a log
+    padded = np.pad(np.concatenate([late[1:2], late[1:]]), width // 2, mode="reflect", reflect_type="odd")
     smooth = np.convolve(padded, np.ones(width) / width, mode="valid")
     time = first_shown - late + smooth - row / 2
-    time = np.clip(time, first_shown - 0.99 * row, first_shown)
+    time[0] = min(time[0], first_shown[0])
+    time[1:] = np.clip(time[1:], first_shown[1:] - 0.99 * row, first_shown[1:])
     return OwnTimes(float(np.median(np.diff(time))), time, False)
 
 

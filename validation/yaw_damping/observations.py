@@ -99,7 +99,11 @@ def need_flight(recording: Recording) -> None:
     """Raise `InputError` for what is no flight."""
     if recording.plant != "flight":
         where = recording.path or recording.name
-        raise InputError(f"{where}: is a {recording.plant}; expected a flight, for C_Nr needs an airspeed")
+        raise InputError(
+            f"{where}: is a {recording.plant}; expected a flight, for C_Nr needs an airspeed. Of a throw with fixes or "
+            'a track, import the log with the map that a first import wrote, in which you state plant = "flight", the '
+            "disc ([disc]) and air_density_kg_m3 in [environment]"
+        )
 
 
 def misplaced(recording: Recording, error: float) -> Recording:

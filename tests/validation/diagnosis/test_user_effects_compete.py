@@ -41,7 +41,7 @@ from discsim.validation.identification.sensor_model import is_motion, predicted
 
 FIELD, RIG = Environment(air_density=None), Rig(1e-3, 8e-5)
 MODULE = Instruments.from_parts("mpu9250")
-PAGE = ROOT / "docs" / "diagnosing.md"
+PAGE = ROOT / "docs" / "your-own-effect.md"
 #: a law of no size, which stands behind a user's own numbers
 LAW = {("law", "0.target"): 5.0, ("law", "0.coefficient"): 0.0}
 

@@ -58,9 +58,20 @@ def test_a_line_that_broke_off_spoils_its_own_record_alone(tmp_path):
         "ax,ay,az,gx,gy,gz\n" + "1,2,3,4,5\n" * 40,
         "ax,ay,az\n" + "1\n2\n3\n" * 40,
         "one,two,three,four,five,six\n" + "1,2,3\n" * 40,
+        # half of the columns have nothing to say, as those of a receiver without a fix: two rows had become one
+        "ax,ay,az,gx,gy,gz,lat,lon,alt,speed,sats,fix\n" + "1,2,3,4,5,6,,,,,,\n" * 40,
+        "ax\tay\taz\tgx\tgy\tgz\tlat\tlon\talt\tv\tsats\tfix\n" + "1\t2\t3\t4\t5\t6\t\t\t\t\t\t\n" * 40,
         "ax,ay,az,gx,gy,gz\n" + "1,2,3\n" * 6,
     ],
-    ids=["a record a line", "a name too many", "one sensor", "other names", "too few"],
+    ids=[
+        "a record a line",
+        "a name too many",
+        "one sensor",
+        "other names",
+        "too few",
+        "half empty",
+        "half empty by tabs",
+    ],
 )
 def test_other_texts_are_left_as_they_are(tmp_path, text):
     raw = tmp_path / "log.txt"

@@ -247,3 +247,24 @@ def test_json_without_a_log_in_it_is_refused_with_what_is_expected(tmp_path, tex
     raw.write_text(text)
     with pytest.raises(InputError, match=what):
         import_log(raw)
+
+
+@pytest.mark.parametrize("stamp", ["14:03:2{:06.3f} -> ", "I ({:.0f}) imu: ", ""])
+def test_lines_that_a_board_prints_between_its_records_are_none(tmp_path, stamp):
+    """Each board prints one as it starts, and one of a network now and then: the log was refused."""
+    lines = []
+    for k, t in enumerate(LOG.t[:1200]):
+        before = stamp.format(1000 * t + 300 if "imu" in stamp else t)
+        lines += [before.replace("imu", "wifi") + "connected"] * (k % 25 == 0)
+        values = zip(("a", "g", "m"), (LOG.accel[k], LOG.gyro[k] / DEG, LOG.mag[k]), strict=True)
+        record = {
+            f"{name}{axis}": round(float(x), 4) for name, three in values for axis, x in zip("xyz", three, strict=True)
+        }
+        lines.append(before + json.dumps(record))
+    raw = tmp_path / "serial.log"
+    raw.write_text("\n".join([*lines, ""]))
+    read = import_log(raw)
+    samples = read.recordings[0].samples
+    assert set(samples) == {"accelerometer", "gyroscope", "magnetometer"}
+    assert len(samples["gyroscope"]) == 1200
+    assert "JSON, read as a table of its records: 1200" in read.summary()

@@ -60,11 +60,11 @@ def test_the_rates_of_flight_mechanics_are_a_gyroscope(tmp_path, names):
 
 
 def test_what_a_phone_s_fusion_gives_is_read_where_it_is_all_there_is(tmp_path):
-    """It has the rate less its bias, and the field less its iron; the log had no gyroscope."""
+    """It has the rate less its bias, and the field less its iron; the log had no gyroscope. It shows gravity itself."""
     columns = [("loggingTime(txt)", [f"2026-08-11 14:03:{20 + t:06.3f} +0200" for t in LOG.t])]
-    columns += three([f"accelerometerAcceleration{axis}(G)" for axis in "XYZ"], LOG.accel / G0)
+    columns += three([f"accelerometerAcceleration{axis}(G)" for axis in "XYZ"], -LOG.accel / G0)
     columns += three([f"motionRotationRate{axis}(rad/s)" for axis in "XYZ"], LOG.gyro)
-    columns += three([f"motionUserAcceleration{axis}(G)" for axis in "XYZ"], LOG.accel / G0 - [0.0, 0.0, 1.0])
+    columns += three([f"motionUserAcceleration{axis}(G)" for axis in "XYZ"], -LOG.accel / G0 - [0.0, 0.0, 1.0])
     columns += three([f"motionMagneticField{axis}(uT)" for axis in "XYZ"], LOG.mag)
     samples = import_log(write_table(tmp_path / "log.csv", columns)).recordings[0].samples
     assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-5)

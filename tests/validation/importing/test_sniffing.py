@@ -413,6 +413,11 @@ REFUSED = {
         b"ms,rpm\n" + b"".join(b"%d,%d\n" % (10 * k, 600 - k) for k in range(50)),
         "'rpm' is a rate about one axis: a map takes it in [sensors.rate_reference], columns = [\"rpm\"], unit = ",
     ),
+    "throws.csv": (
+        b"Throw,Speed (mph),Spin (rpm),Nose Angle (deg),Launch Angle (deg)\n"
+        + b"".join(b"%d,60.%d,11%02d,1.1,9.2\n" % (k, k % 10, k) for k in range(24)),
+        "each row tells a whole throw ('Nose Angle (deg)', 'Launch Angle (deg)'), and a recording is readings over",
+    ),
     "broken.zip": (b"PK\x03\x04" + bytes(100), "cannot be unpacked"),
     "pointer.csv": (
         b"version https://git-lfs.github.com/spec/v1\noid sha256:5450\nsize 87365\n",

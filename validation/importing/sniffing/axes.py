@@ -50,6 +50,14 @@ APART = 0.8
 SAME = 1.02
 #: How magnetometers lie on the gyroscope of their package by its data sheet: in an ICM-20948, in an MPU-9250.
 OF_PARTS = ("x -y -z", "y x -z")
+#: Share of the field that must be along the vertical for its sign to tell anything: a dip of 12 degrees.
+UP = 0.2
+#: Said where a magnetometer lies as the gyroscope and its field points up at rest.
+UPWARD = (
+    "the field points up while the log lies still: it was made south of the equator, or the accelerometer shows "
+    "gravity itself (-1 g along the axis that points up, as iPhones do; then the spin is of the other sense: turn the "
+    "sign of its scale in the map, and up and down of all axes), or the magnetometer is reversed; --place tells"
+)
 #: Share of the readings in a spin that stand at one limit, above which a gyroscope tells no rate but that it is faster.
 CLIPPED = 0.5
 
@@ -72,8 +80,11 @@ def letters(matrix: FloatArray) -> list[str]:
     return [f"{'-' if row[(k := int(np.argmax(np.abs(row))))] < 0 else ''}{'xyz'[k]}" for row in matrix]
 
 
-def body_axes(sensors: Mapping[str, Reading3]) -> BodyAxes:
-    """Return how the sensors present lie in the body."""
+def body_axes(sensors: Mapping[str, Reading3], field_down: float | None = None) -> BodyAxes:
+    """Return how the sensors present lie in the body.
+
+    ``field_down`` is the share of the field that points down at the place, None where that is not known.
+    """
     odd = odd_one(sensors)
     if odd is not None and odd.sensor == "magnetometer" and (fits := _compared(sensors)) and fits[0].ratio <= EXPLAINED:
         odd = None  # step by step it shows how it lies
@@ -92,7 +103,7 @@ def body_axes(sensors: Mapping[str, Reading3]) -> BodyAxes:
     matrix = {sensor: base for sensor in sensors}
     notes = [] if odd is None else [odd.note]
     if "gyroscope" in sensors and "magnetometer" in sensors:
-        laid, decision, note = _laid(straight, axis if spins else None)
+        laid, decision, note = _laid(straight, axis if spins else None, field_down)
         if odd is not None and odd.sensor == "gyroscope":
             matrix["gyroscope"] = base @ laid.T  # the magnetometer lies as the accelerometer does
         else:
@@ -171,7 +182,7 @@ def _compared(sensors: Mapping[str, Reading3]) -> list[Fit]:
     return best_axes(steps_between(gyro.t, gyro.value, field.t, field.value), 1.0)
 
 
-def _laid(sensors: Mapping[str, Reading3], spin: int | None) -> _Laid:
+def _laid(sensors: Mapping[str, Reading3], spin: int | None, field_down: float | None) -> _Laid:
     """Return how the magnetometer lies on the gyroscope; ``spin`` is the axis of the spin, None where nothing spins."""
     what, fits = "magnetometer axes", _compared(sensors)
     if not fits:
@@ -186,8 +197,11 @@ def _laid(sensors: Mapping[str, Reading3], spin: int | None) -> _Laid:
         sure: Sureness = "certain" if len(alike) <= 2 and same.ratio < CLEARLY else "likely"
         why = f"so the field turns as the gyroscope says ({100 * same.ratio:.0f} % of its changes left)"
         why += "" if len(alike) <= 2 else f"; {len(alike) - 1} other ways fit as well"
-        return _Laid(np.eye(3), Decision(what, AS_WRITTEN, sure, why))
-    chosen, by = _of_two(alike, sensors["magnetometer"], sensors.get("accelerometer"))
+        up = _upward(sensors["magnetometer"], sensors.get("accelerometer"), same.offset)
+        # where the place is known the import looks at all of the rest, and warns
+        note = UPWARD if field_down is None and up > UP * _size(sensors["magnetometer"], same.offset) else ""
+        return _Laid(np.eye(3), Decision(what, AS_WRITTEN, sure, why), note)
+    chosen, by = _of_two(alike, sensors["magnetometer"], sensors.get("accelerometer"), field_down)
     named = " ".join(letters(chosen.axes))
     left = next(f.ratio for f in fits if np.array_equal(f.axes, np.eye(3)))
     why = f"{100 * chosen.ratio:.0f} % of the field's changes are left, {100 * left:.0f} % if they lay as written{by}"
@@ -240,21 +254,26 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     return -int(np.sign(np.median(angle)) * np.sign(least)) if clear else 0
 
 
-def _upward(field: Reading3, accel: Reading3 | None) -> float:
-    """Return the field's component against gravity at rest, uT; 0 where no rest is known."""
+def _upward(field: Reading3, accel: Reading3 | None, offset: FloatArray | float = 0.0) -> float:
+    """Return the field's component against gravity at rest, uT, less an offset (3,); 0 where no rest is known."""
     if accel is None:
         return 0.0
     still = resting(accel, None)
     if still.sum() < 10:
         return 0.0
-    there = np.column_stack([np.interp(accel.t[still], field.t, field.value[:, k]) for k in range(3)])
+    there = np.column_stack([np.interp(accel.t[still], field.t, field.value[:, k]) for k in range(3)]) - offset
     return float(np.nanmedian(np.sum(there * accel.value[still], axis=1))) / G0
 
 
-def _of_two(alike: list[Fit], field: Reading3, accel: Reading3 | None) -> tuple[Fit, str]:
+def _size(field: Reading3, offset: FloatArray) -> float:
+    """Return the usual size of a field without its offset (3,), uT."""
+    return float(np.nanmedian(np.linalg.norm(field.value - offset, axis=1)))
+
+
+def _of_two(alike: list[Fit], field: Reading3, accel: Reading3 | None, field_down: float | None) -> tuple[Fit, str]:
     """Choose among ways that fit alike: all three axes reversed fit as well, and the field's dip tells them apart.
 
-    North of the equator, where nine people of ten live, the field points down.
+    North of the equator, where nine people of ten live, the field points down; ``field_down`` tells what it does.
     """
     least = min(fit.overall for fit in alike)
     same = [fit for fit in alike if fit.overall <= SAME * least]
@@ -272,4 +291,8 @@ def _of_two(alike: list[Fit], field: Reading3, accel: Reading3 | None) -> tuple[
     t, up = accel.t[still], accel.value[still] / G0
     there = np.column_stack([np.interp(t, field.t, field.value[:, k]) for k in range(3)])
     upward = [float(np.median(np.sum((there @ fit.axes.T - fit.offset) * up, axis=1))) for fit in pair]
-    return pair[int(np.argmin(upward))], "; of this and all three reversed, this has the field point down at rest"
+    if field_down is None or abs(field_down) < UP:
+        return pair[int(np.argmin(upward))], "; of this and all three reversed, this has the field point down at rest"
+    way = "down" if field_down > 0 else "up"
+    by = f"; of this and all three reversed, this has the field point {way} at rest, as it does there"
+    return pair[int(np.argmin(np.sign(field_down) * np.array(upward)))], by

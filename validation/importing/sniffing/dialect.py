@@ -275,6 +275,7 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
         if joined is not None:
             return Dialect(joined[0], joined[1], (), True, record, width, (*remarks, "header broken over two lines"))
         if texts and _names_sensors(texts[-1]):
+            _refuse_broken_numbers(path, layout, above[-1] + 1, len(texts[-1]), width)
             fault = f"the line of names has {len(texts[-1])} for {width} columns and was not used: mend it"
             remarks = (*remarks, fault)
         columns = tuple(f"c{k + 1}" for k in range(width))
@@ -390,6 +391,28 @@ def _repeated(cells: list[str]) -> bool:
     """Tell what repeats, as units do: names are other ones in each column."""
     full = [cell for cell in cells if cell]
     return len(set(full)) <= len(full) / 2
+
+
+def _refuse_broken_numbers(path: Path, layout: Layout, first: int, names: int, width: int) -> None:
+    """Refuse records whose decimal mark parts their cells, too: a comma in ``0,002,1,003`` is the one or the other.
+
+    There are more cells than names then, and as many of them as there are more are digits of one length without a sign,
+    some with zeros before them, in each record from the line ``first`` on.
+    """
+    more = width - names
+    if layout.separator == "blank" or layout.decimal == layout.separator or not 0 < more <= names:
+        return
+    rows = [layout.cells(line) for line in islice(TextLines(path, layout.encoding), first, first + HEAD_LINES)]
+    columns = list(zip(*[cells for cells in rows if len(cells) == width], strict=True))
+    parts = [cells for cells in columns if all(cell.isdigit() for cell in cells) and len({*map(len, cells)}) == 1]
+    zeros = [cells for cells in parts if len(cells[0]) > 1 and any(cell.startswith("0") for cell in cells)]
+    if len(parts) >= more and 2 * len(zeros) >= more > names // 2:
+        raise InputError.at(
+            path,
+            first + 1,
+            f"has {width} cells for {names} names, and digits without a sign in every other one: the decimal mark "
+            "parts cells, too; expected two signs for the two: save it anew with semicolons between cells",
+        )
 
 
 def _joined(path: Path, layout: Layout, above: list[int], width: int) -> tuple[Layout, tuple[str, ...]] | None:

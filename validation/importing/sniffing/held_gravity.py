@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from discsim.validation.importing.import_map import G0
+from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.magnitudes import PER_G, REST, gravity_norm, rest_norm
 from discsim.validation.importing.sniffing.names import NO_READING, is_called_linear
 
-__all__ = ["linear_with_gravity", "rests", "weightless"]
+__all__ = ["GRAVITY_ITSELF", "linear_with_gravity", "rests", "shows_gravity", "weightless"]
+
+#: Names of iOS's motion beside the raw sensors, whose accelerometer reads -1 g along the axis that points up.
+_OF_IOS = ("motionuseracceleration", "motiongravity")
+GRAVITY_ITSELF = Decision(
+    "accelerometer sign",
+    "turned",
+    "likely",
+    "columns are called as iOS does, whose accelerometer shows gravity itself: -1 g along the axis that points up",
+)
+
+
+def shows_gravity(names: Sequence[str]) -> bool:
+    """Tell by the names of a log's columns whether its accelerometer shows gravity and not the force against it."""
+    return any(name.lower().startswith(_OF_IOS) for name in names)
 
 
 def weightless(triple: Triple) -> bool:

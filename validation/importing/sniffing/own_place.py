@@ -29,6 +29,7 @@ _DEGREE_KM, _APART_KM = 111.1, 20.0
 
 #: what clocks of dates count from
 _FIRST = datetime(1970, 1, 1, tzinfo=UTC)
+_ANY_DAY = date(2025, 1, 1)
 
 
 class OwnPlace(NamedTuple):
@@ -58,6 +59,12 @@ class OwnPlace(NamedTuple):
         except InputError:
             return self
         return self._replace(day=day, field=float(np.linalg.norm(there)))
+
+    @property
+    def down(self) -> float:
+        """The share of the field that points down there: of the day, or of any, for it is slow to change its sign."""
+        there = world_magnetic_field(self.latitude, self.longitude, self.day or _ANY_DAY)
+        return float(there[2] / np.linalg.norm(there))
 
     @property
     def note(self) -> str:

@@ -15,7 +15,7 @@ from discsim.files import model_names
 from discsim.recording import SENSORS, Plant
 from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
-from discsim.validation.importing.sniffing.axes import body_axes
+from discsim.validation.importing.sniffing.axes import BodyAxes, body_axes
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour, lines_of_a_record
 from discsim.validation.importing.sniffing.by_each_other import by_each_other, in_si
 from discsim.validation.importing.sniffing.clock import (
@@ -33,7 +33,13 @@ from discsim.validation.importing.sniffing.exchanged import exchanged
 from discsim.validation.importing.sniffing.fixes import fixes_of
 from discsim.validation.importing.sniffing.full_scale import full_scale
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
-from discsim.validation.importing.sniffing.held_gravity import linear_with_gravity, rests, weightless
+from discsim.validation.importing.sniffing.held_gravity import (
+    GRAVITY_ITSELF,
+    linear_with_gravity,
+    rests,
+    shows_gravity,
+    weightless,
+)
 from discsim.validation.importing.sniffing.late_clock import late_clock, moved
 from discsim.validation.importing.sniffing.magnitudes import (
     Unit,
@@ -58,6 +64,7 @@ from discsim.validation.importing.sniffing.seen_turns import (
     seen_turns,
     ticking,
 )
+from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.suggestion import either_gyroscope, suggested
 from discsim.validation.importing.sniffing.track import track_of
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
@@ -85,10 +92,11 @@ class _File:
     triples: tuple[Triple, ...]
 
 
-def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
+def sniff(raw: Path, plant: Plant = "free_spin", down: float | None = None) -> Proposal:
     """Propose a map for a raw file, or a folder with one file per sensor.
 
-    Raises `InputError` where nothing can be read or no three columns look like a sensor of motion.
+    ``down`` is the share of the field that points down at the place, None where that is not known. Raises `InputError`
+    where nothing can be read or no three columns look like a sensor of motion.
     """
     files, failures = _read(raw)
     layout, files, aside, notes = _one_layout(files)
@@ -127,7 +135,8 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     notes += [either] * bool(either)
     notes += [*said, *(note for _, note in others), *apart.notes, *own.notes, *([place.note] if place else [])]
     notes = [*exchanges, *notes]
-    sniffed = _Sniffed(raw, plant, layout, own, found, notes)
+    down = place.down if down is None and place is not None else down
+    sniffed = _Sniffed(raw, plant, layout, own, found, notes, down)
     proposal = _proposal(sniffed, clock, {})
     if offsets := _offsets(proposal, own, found):
         proposal = _proposal(sniffed, clock, offsets)
@@ -213,11 +222,22 @@ def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[Numbe
     )
     apart = [file for file in files if file not in best]
     aside = [file.numbers for file in apart if file.numbers.tells_positions]
-    others = [file.numbers.path.name for file in apart if weight(file) and not file.numbers.tells_positions]
+    others = [file for file in apart if weight(file) and not file.numbers.tells_positions]
+    spelt = [file for file in others if replace(key(file), columns=()) == replace(key(best[0]), columns=())]
+    wrongs = (
+        ("named", spelt, "give each of its columns a name of its own in the first line, or import it alone"),
+        (
+            "laid out",
+            [file for file in others if file not in spelt],
+            "save it with the same separator and decimal mark",
+        ),
+    )
     notes = [
-        f"left out, laid out in another way than {best[0].numbers.path.name}: {', '.join(others)}; to have it read, "
-        "save it with the same separator and decimal mark"
-    ] * bool(others)
+        f"left out, {how} in another way than {best[0].numbers.path.name}: "
+        f"{', '.join(file.numbers.path.name for file in some)}; to have it read, {remedy}"
+        for how, some, remedy in wrongs
+        if some
+    ]
     words = [remark for file in best[:1] for remark in file.numbers.dialect.remarks]
     return layout, best, aside, notes + ([f"text: {', '.join(words)}"] if words else [])
 
@@ -426,7 +446,10 @@ def _fitted(
 
 @dataclass(frozen=True)
 class _Sniffed:
-    """What a raw log holds, before its times, units and axes are decided: its sensors, and clocks of their own."""
+    """What a raw log holds, before its times, units and axes are decided: its sensors, and clocks of their own.
+
+    ``down`` is the share of the field that points down at the place, None where that is not known.
+    """
 
     raw: Path
     plant: Plant
@@ -434,6 +457,7 @@ class _Sniffed:
     own: OwnClocks
     found: dict[str, tuple[Triple, Decision]]
     notes: list[str]
+    down: float | None = None
 
 
 def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float, Decision]]) -> Proposal:
@@ -480,7 +504,7 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
         times = {sensor: slower * time for sensor, time in times.items()}
         notes = [*filter(None, [counter_note(clock)]), *notes]
     readings = {sensor: in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
-    axes = body_axes(readings)
+    axes = _body_axes(readings, sniffed)
     # a table may be told to turn at just such a rate
     limits = (
         {"gyroscope": full_scale(readings["gyroscope"])}
@@ -496,6 +520,17 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
     decisions = decided if found else ()  # positions alone have no axes of a board
     head = (_name(sniffed.raw), sniffed.raw, sniffed.plant, sniffed.layout, clock)
     return Proposal(*head, tuple(sensors), decisions, (*axes.notes, *notes))
+
+
+def _body_axes(readings: Mapping[str, Reading3], sniffed: _Sniffed) -> BodyAxes:
+    """Return how the sensors lie in the body; an accelerometer that shows gravity itself is turned about first."""
+    turned = "accelerometer" in readings and shows_gravity(sniffed.found["accelerometer"][0].numbers.table.columns)
+    if not turned:
+        return body_axes(readings, sniffed.down)
+    pull = readings["accelerometer"]
+    axes = body_axes({**readings, "accelerometer": replace(pull, value=-pull.value)}, sniffed.down)
+    matrix = {**axes.matrix, "accelerometer": -axes.matrix["accelerometer"]}
+    return replace(axes, matrix=matrix, decisions=(GRAVITY_ITSELF, *axes.decisions))
 
 
 def _name(raw: Path) -> str:

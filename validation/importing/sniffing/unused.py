@@ -89,9 +89,23 @@ def _one_rate(numbers: Numbers, left: Sequence[int]) -> str | None:
     )
 
 
+#: Names of numbers of a throw as a whole, and how many make a table of throws.
+_OF_THROWS = re.compile(r"\b(?:launch|nose|hyzer|carry|club|handedness|ball speed|advance ratio)\b", re.IGNORECASE)
+_SUMMED = 2
+
+
 def one_axis_rate(tables: Sequence[Numbers]) -> str | None:
-    """Return how a map takes a column that is a rate about one axis, or None where no column's unit is one."""
+    """Return how a map takes a column that is a rate about one axis, or None where no column's unit is one.
+
+    Where each row tells a throw, as of a radar or a disc that sums up its flight, that is said.
+    """
     for numbers in tables:
+        summed = [_shown(name) for name in numbers.table.columns if _OF_THROWS.search(name)]
+        if len(summed) >= _SUMMED:
+            return (
+                f"each row tells a whole throw ({', '.join(map(repr, summed[:4]))}), and a recording is readings over "
+                "the time of one: discsim fly takes such numbers (--speed, --spin, --launch, --nose, --hyzer)"
+            )
         for k in _left(numbers, ()):
             units = [reading.unit for reading in readings_of(read_name(numbers.names[k]).unit)]
             name = _shown(numbers.table.columns[k])

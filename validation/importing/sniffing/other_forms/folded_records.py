@@ -53,7 +53,11 @@ def _fold(path: Path) -> _Fold | None:
         names = _cells(line)
         if sum(sensor_of(read_name(name).base) is not None for name in names) < _NAMED:
             continue
-        widths = [len(cells) for cells in map(_numbers, lines[at + 1 :]) if cells]
+        sign = _sign(line)
+        below = [one for one in lines[at + 1 :] if one.strip()]
+        if sign is not None and 2 * sum(one.count(sign) >= line.count(sign) for one in below) > len(below):
+            return None  # each line has a cell for each name, empty where a column has nothing to say
+        widths = [len(cells) for cells in map(_numbers, below) if cells]
         record = _widths(widths, len(names))
         return None if record is None else _Fold(at, tuple(names), record)
     return None
@@ -70,8 +74,13 @@ def _widths(widths: Sequence[int], count: int) -> tuple[int, ...] | None:
     return None
 
 
+def _sign(line: str) -> str | None:
+    """Return the sign that parts a line's cells, None where blanks do."""
+    return next((sign for sign in _SIGNS if sign in line), None)
+
+
 def _cells(line: str) -> list[str]:
-    sign = next((sign for sign in _SIGNS if sign in line), None)
+    sign = _sign(line)
     return [cell.strip() for cell in (line.split() if sign is None else line.strip(f"{sign} \n").split(sign))]
 
 

@@ -31,7 +31,10 @@ _Record: TypeAlias = Mapping[str, Any]
 
 _BEGINS = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*)?\{\s*[\"']")
 #: What a program's log has before each record: brackets and words, no brace and no more than a line.
-_LOGGED = re.compile(rb"(?:\xef\xbb\xbf)?[^\n{}]{1,120}\{\s*[\"'][^\n]*\}\r?\n")
+_LOGGED = re.compile(rb"(?:\xef\xbb\xbf)?[^\n{}]{0,120}\{\s*[\"'][^\n]*\}\r?\n")
+#: So many bytes of a file are looked at for these, and lines that a board prints as it starts; from the first record on
+#: this share of lines are records, others are messages.
+_LOOKED_AT, _BOOT, _RECORDS = 1 << 16, 200, 0.8
 #: A list of lists, and one of those in it; numpy prints no commas.
 _LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*\[[^\[\]{}]*,[^\[\]{}]*\]")
 _LIST = re.compile(r"\[[^\[\]{}]*\]")
@@ -62,8 +65,11 @@ def begins(path: Path) -> bool:
     head = first_bytes(path, 1 << 12)
     if any(form.match(head) is not None for form in (_BEGINS, _LISTS, _TIMED)):
         return True
-    lines = head.splitlines(keepends=True)[:-1]
-    return len(lines) >= FEWEST and all(_LOGGED.fullmatch(line) is not None for line in lines)
+    logged = [
+        _LOGGED.fullmatch(line) is not None for line in first_bytes(path, _LOOKED_AT).splitlines(keepends=True)[:-1]
+    ]
+    records = logged[logged.index(True) :] if any(logged[:_BOOT]) else []
+    return sum(records) >= max(FEWEST, _RECORDS * len(records))
 
 
 def write_tables(raw: Path, target: Path) -> list[str]:
