@@ -350,9 +350,7 @@ def summary(
     hidden = [s for a, _, s in scored if a.effects]
     unknown = [(d, s) for a, d, s in scored if a.kind == "off_catalogue"]
     real = [(a, s) for a, _, s in scored if a.kind == "like_real"]
-    # a fault with nothing beside it has no size
-    pairs = zip(scored, told or [None] * len(scored), strict=True)
-    faulty = [(size, s) for (a, _, s), size in pairs if a.kind == "setup"]
+    faulty = zip(scored, told or [None] * len(scored), strict=True)
     errors = [[(d.effect, abs(z)) for d in s.deviations if (z := d.in_sd) is not None] for _, _, s in scored]
     stated = [[z for effect, z in group if effect == RECALIBRATED] for group in errors]
     of_effects = [[z for effect, z in group if effect != RECALIBRATED] for group in errors]
@@ -382,12 +380,22 @@ def summary(
         "exponent_given_rate": rate(s.exponent is not None for a, _, s in scored if has_power_law(a)),
         "exponent_within_2sd_rate": rate(abs(z) <= 2.0 for z in exponents),
         "heldout_improved_rate": rate(gained),
-        "right_setup_rate": rate(s.right for _, s in faulty),
-        "right_setup_rate_where_told_apart": rate(s.right for size, s in faulty if size is None or size >= 2.0),
+        **_setup_rates([(s, size) for (a, _, s), size in faulty if a.kind == "setup"]),
         "right_verdict_like_real_rate": rate(s.right_verdict for _, s in real),
         "right_like_real_rate": rate(s.right for _, s in real),
         "found_like_real_rate": clustered_rate([id in s.named for id in a.effects] for a, s in real),
         "crash_rate": rate(s.crashed for _, _, s in scored),
+    }
+
+
+def _setup_rates(scored: Sequence[tuple[CaseScore, float | None]]) -> dict[str, Rate]:
+    """Return how often faults of the setup are right, by the scores and the sizes of what is beside them.
+
+    All of them, and those with nothing beside them (None) or with an effect above twice the size at which it is told.
+    """
+    return {
+        "right_setup_rate": rate(s.right for s, _ in scored),
+        "right_setup_rate_where_told_apart": rate(s.right for s, size in scored if size is None or size >= 2.0),
     }
 
 
