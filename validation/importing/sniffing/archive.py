@@ -22,6 +22,7 @@ from discsim.files import endless
 from discsim.validation.importing.logs import kind_of, write_tables
 from discsim.validation.importing.sniffing.other_forms import writer_of
 from discsim.validation.importing.sniffing.other_forms.written import first_bytes
+from discsim.validation.importing.sniffing.receiver_lines import between, parted
 
 __all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
 
@@ -48,7 +49,8 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
     """Give ``raw`` itself, or a folder of that name with the files of a zip or a log's tables, gone afterwards.
 
     What is in gzip stands there without that ending. In a folder a receiver's track (NMEA, GPX) becomes a table under
-    its own name beside the other files; so does what is JSON, there and by itself. ``say`` is told what was left out of
+    its own name beside the other files; so does what is JSON, there and by itself, and sentences that a log has between
+    its lines. ``say`` is told what was left out of
     a log of messages, and of JSON. Raises `InputError` for no such file, a damaged zip or gzip, one with a password,
     one with paths that lead out of it or links, one above the limits, a log that cannot be read.
     """
@@ -72,6 +74,12 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
             for note in write_tables(logged, kind, tables):
                 say(note)
             logged = tables
+        elif logged.is_file() and between(logged):
+            apart = Path(place) / "apart" / logged.name
+            apart.mkdir(parents=True)
+            for note in parted(logged, apart):
+                say(note)
+            logged = _with_tracks(apart, Path(place) / "beside" / logged.name, say)
         elif logged.is_file():
             logged = _as_tables(logged, Path(place), say)
         elif logged.is_dir():
@@ -100,7 +108,8 @@ def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path
     """Return the folder itself, or where receivers' tracks or JSON are in it ``folder``, their tables and all else."""
     children = [child for child in sorted(logged.iterdir())[:MAX_FILES] if child.is_file()]
     tracks = {child: kind for child in children if (kind := kind_of(child)) is not None and kind.fixes}
-    rewritten = {child: write for child in children if (write := writer_of(child)) is not None}
+    others = (child for child in children if child not in tracks)
+    rewritten = {child: write for child in others if (write := writer_of(child)) is not None}
     if not rewritten and (not tracks or len(children) == len(tracks)):
         return logged
     folder.mkdir(parents=True)

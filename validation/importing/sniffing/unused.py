@@ -39,7 +39,9 @@ def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]
         names = [_shown(numbers.table.columns[k]) or f"column {k + 1} (no name)" for k in _left(numbers, used)]
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
         if names:
-            notes.append(f"not used{_of(numbers, tables)}: {', '.join(names[:MOST_NAMES])}{more}")
+            rates = _rates(numbers, used)
+            read = f"; {rates[0]}" if len(rates) == 1 else ""
+            notes.append(f"not used{_of(numbers, tables)}: {', '.join(names[:MOST_NAMES])}{more}{read}")
     others = len(notes) - MOST_FILES
     return notes[:MOST_FILES] + ([f"not used: columns of {others} more files"] if others > 0 else [])
 
@@ -106,15 +108,23 @@ def one_axis_rate(tables: Sequence[Numbers]) -> str | None:
                 f"each row tells a whole throw ({', '.join(map(repr, summed[:4]))}), and a recording is readings over "
                 "the time of one: discsim fly takes such numbers (--speed, --spin, --launch, --nose, --hyzer)"
             )
-        for k in _left(numbers, ()):
-            units = [reading.unit for reading in readings_of(read_name(numbers.names[k]).unit)]
-            name = _shown(numbers.table.columns[k])
-            bare = [reading.unit for reading in readings_of(name)]  # 'rpm'
-            for unit in (*units, *bare):
-                if unit in UNITS["rad_s"] and unit != "Hz":  # 'rate (Hz)' is a sampling rate as often
-                    text = f'columns = ["{name}"], unit = "{unit}"'
-                    return f"'{name}' is a rate about one axis: a map takes it in [sensors.rate_reference], {text}"
+        if rates := _rates(numbers, ()):
+            return rates[0]
     return None
+
+
+def _rates(numbers: Numbers, used: Collection[tuple[Path, str]]) -> list[str]:
+    """Return how a map takes each column that is not ``used`` and whose unit is that of a rate."""
+    found = []
+    for k in _left(numbers, used):
+        units = [reading.unit for reading in readings_of(read_name(numbers.names[k]).unit)]
+        name = _shown(numbers.table.columns[k])
+        bare = [reading.unit for reading in readings_of(name)]  # 'rpm'
+        unit = next((unit for unit in (*units, *bare) if unit in UNITS["rad_s"] and unit != "Hz"), None)
+        if unit is not None:  # 'rate (Hz)' is a sampling rate as often
+            text = f'columns = ["{name}"], unit = "{unit}"'
+            found.append(f"'{name}' is a rate about one axis: a map takes it in [sensors.rate_reference], {text}")
+    return found
 
 
 def _of(numbers: Numbers, tables: Sequence[Numbers]) -> str:
