@@ -22,6 +22,7 @@ __all__ = [
     "runs",
     "scatter_of",
     "sd_by_median",
+    "sd_of_share",
     "sealed",
     "vector3",
     "within_half_turn",
@@ -62,6 +63,11 @@ def sealed(array: FloatArray) -> FloatArray:
     """Return an array that nobody else holds, made read-only: `readonly` without a copy."""
     array.setflags(write=False)
     return array
+
+
+def sd_of_share(share: float, count: float) -> float:
+    """Return the standard deviation of a share of so many; of none and of all as if one had been the other."""
+    return float(np.sqrt(max(share * (1.0 - share), 1.0 / count) / count))
 
 
 def sd_by_median(values: ArrayLike, axis: int | None = None) -> Any:

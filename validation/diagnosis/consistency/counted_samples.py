@@ -16,11 +16,12 @@ from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.phase_regression import (
-    circle_centre,
     rate_of,
     signal_of,
     slow_columns,
+    slow_count,
 )
+from discsim.validation.identification.circle import circle_centre
 
 __all__ = ["PRICE", "Counted", "Field", "count_samples", "field_of", "followed", "rms", "unslipped"]
 
@@ -96,7 +97,7 @@ class _Flexible:
 
     @property
     def _count(self) -> int:
-        return 4 + int(self.end / _KNOTS_S)
+        return slow_count(self.end, _KNOTS_S)
 
     def held(self, size: float) -> FloatArray:
         """Return the rows (c, p) that hold second differences of the splines' coefficients to a share of ``size``."""

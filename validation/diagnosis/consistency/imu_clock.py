@@ -41,8 +41,8 @@ from discsim.validation.diagnosis.consistency.phase_regression import (
 
 __all__ = ["ImuClock", "ImuRows", "imu_clock_of"]
 
-#: knots of the wobble's amplitude, s, as in the count of the field's samples (it halves in 0.3 s or more), and of what
-#: stands still in the body or in the air
+#: knots of the wobble's amplitude, s, a little closer than where the field's samples are counted (it halves in 0.3 s or
+#: more), and of what stands still in the body or in the air
 _KNOTS_S, _SLOW_S = 0.25, 0.6
 #: periods that are tried, as shares of the logger's rows: parts are set to the loop's rate, and their oscillators are
 #: off by 10 % and less (ISM330DHCX: the data rate of a sheet of 104 Hz is 94 to 114 Hz)
@@ -235,7 +235,7 @@ def _wobble_of(recording: Recording, shown: SamplesShown, period: float) -> _Wob
         wobble.t[here], rate.t[np.isfinite(rate.value[:, 2])], rate.value[np.isfinite(rate.value[:, 2]), 2]
     )
     asked = (shown.newest[both] - shown.newest[0]) * period
-    if asked.size < 8 * int(4 + asked[-1] / _KNOTS_S):
+    if asked.size < 8 * slow_count(float(asked[-1]), _KNOTS_S):
         return None
     smooth = np.polynomial.Polynomial.fit(asked, spin, 4)
     return _Wobble(wobble.value[here], wobble.t[here], asked, smooth.integ(), smooth, wobble.order, period)

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.special import xlogy
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, sd_of_share
 
 __all__ = [
     "MISCOUNTED",
@@ -224,7 +224,7 @@ def _share(decided: Iterable[Decided]) -> tuple[float, float]:
     late, on_time = np.sum([[np.count_nonzero(one) for one in rows] for rows in decided], axis=0)
     count = max(int(late + on_time), 1)
     share = float(late) / count
-    return share, float(np.sqrt(max(share * (1.0 - share), 1.0 / count) / count))
+    return share, sd_of_share(share, count)
 
 
 def _agreed(told: Iterable[tuple[Decided, Decided]]) -> float:

@@ -28,12 +28,12 @@ from discsim.validation.diagnosis.consistency.counted_samples import (
     unslipped,
 )
 from discsim.validation.diagnosis.consistency.phase_regression import (
-    circle_centre,
     retimed,
     signal_of,
 )
 from discsim.validation.diagnosis.consistency.skipped_samples import OFF, Loops, loops_beside
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
+from discsim.validation.identification.circle import circle_centre
 
 __all__ = ["MOST_ROWS", "OwnClock", "SamplesShown", "own_clock_of", "too_many"]
 

@@ -27,7 +27,6 @@ __all__ = [
     "angle_turned",
     "centripetal",
     "centripetal_of",
-    "circle_centre",
     "explained",
     "left_of",
     "rate_of",
@@ -51,8 +50,6 @@ _STILL = 1
 _CHANGES = {"field": 0, "wobble": 2}
 #: how far a ratio of turns is looked for, in its logarithm, and in which steps
 REACH, STEP = 0.4, 0.01
-#: reweighted steps of the circle that a field runs (bisquare's cousin: Cauchy weights)
-_REWEIGHTED = 12
 #: blocks by which the error of a ratio is judged
 _BLOCKS = 10
 #: of the angle between two readings: how far backwards noise may turn it, rad
@@ -240,19 +237,6 @@ def explained(signal: Signal, psi: FloatArray, ratio: float = 1.0) -> float:
     """Return the share of what may turn that does turn with the angle psi (n,); 0 of too few readings to tell."""
     left, total, count = rest_of(signal, psi, ratio)
     return 1.0 - left / max(total, 1e-300) if count else 0.0
-
-
-def circle_centre(value: ComplexArray) -> complex:
-    """Return the centre of the circle that a field (n,) runs, robustly, by its algebraic equation; no time enters."""
-    x, y = value.real, value.imag
-    A, b = np.column_stack([2.0 * x, 2.0 * y, np.ones(x.size)]), x * x + y * y
-    weight = np.ones(x.size)
-    solution: FloatArray = np.zeros(3)
-    for _ in range(_REWEIGHTED):
-        solution = np.asarray(np.linalg.lstsq(A * weight[:, None], b * weight, rcond=None)[0])
-        left = np.abs(b - A @ solution)
-        weight = 1.0 / np.sqrt(1.0 + (left / (1.5 * max(float(np.median(left)), 1e-12))) ** 2)
-    return complex(solution[0], solution[1])
 
 
 def steps(signal: Signal, psi: FloatArray, centre: complex | None = None) -> tuple[FloatArray, FloatArray]:

@@ -18,11 +18,11 @@ from discsim.arrays import FloatArray
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.phase_regression import (
     angle_turned,
-    circle_centre,
     retimed,
     signal_of,
     steps,
 )
+from discsim.validation.identification.circle import circle_centre
 
 __all__ = ["Durations", "Rows", "durations", "rows_of"]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_of_share
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
 from discsim.validation.diagnosis.detectors.sample_alignment import (
@@ -57,7 +57,7 @@ class Shifted:
     """A screened candidate that changes what the readings mean, and the fit to go on from.
 
     The numbers of that fit go with its trajectories: where nobody knew of the losses a clock took them up.
-    ``screened candidate.gain`` is in chi-squared where the search stood, less the price of each sample that it takes
+    ``screened.gain`` is in chi-squared where the search stood, less the price of each sample that it takes
     for lost. ``cost`` is that price: twice the logarithm of the ways to lose as many.
     """
 
@@ -114,9 +114,8 @@ def _losses(fit: Fit, sensor: str) -> tuple[CandidateEffect, float]:
     lost, sampled = np.sum(mapped(one, range(len(fit.trajectories))), axis=0)
     sampled = max(sampled, 1.0)
     share = float(lost / sampled)
-    sd_of_share = float(np.sqrt(max(share * (1.0 - share), 1.0 / sampled) / sampled))
     cost = price_of_places(float(lost), share) if lost else 0.0
-    return CandidateEffect(_id_of(sensor), (), None, (("fraction", share, sd_of_share),)), cost
+    return CandidateEffect(_id_of(sensor), (), None, (("fraction", share, sd_of_share(share, sampled)),)), cost
 
 
 @dataclass(frozen=True)

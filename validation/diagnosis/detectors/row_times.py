@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_of_share
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.effects.setup import TimeOffset
@@ -154,7 +154,7 @@ class RowTimes:
         steps = sum((shown.newest.size - 1) / (1.0 - shown.lost) for shown in self.clock.shown)
         share = float(np.mean(lost))
         # steps lose their rows by chance: a few recordings may agree better than so many steps can
-        error = max(float(np.std(lost) / np.sqrt(max(lost.size - 1, 1))), float(np.sqrt(share * (1.0 - share) / steps)))
+        error = max(float(np.std(lost) / np.sqrt(max(lost.size - 1, 1))), sd_of_share(share, steps))
         held = len(self.clock.shown) > 1
 
         imu = self.imu if self.imu is not None and not self.imu.loops else None

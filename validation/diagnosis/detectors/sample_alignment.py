@@ -14,6 +14,7 @@ import numpy as np
 from discsim.arrays import ComplexArray, FloatArray, IntArray, sd_by_median, within_half_turn
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
+from discsim.validation.identification.circle import circle_through
 from discsim.validation.identification.prediction import shown
 from discsim.validation.identification.readings import Readings
 from discsim.validation.identification.segments import Trajectory
@@ -22,7 +23,6 @@ from discsim.validation.identification.sensor_model import Values, delay
 __all__ = [
     "ROOM",
     "alignment_of",
-    "circle_through",
     "first_yaw",
     "lost_along",
     "lost_and_turned",
@@ -145,13 +145,6 @@ def phase_counts(recording: Recording) -> FloatArray:
     after[1 + at] = np.where(fits, stepped, 0)
     lost[usable] = after
     return np.cumsum(lost)
-
-
-def circle_through(z: ComplexArray) -> tuple[complex, float]:
-    """Return the centre and the radius of the circle nearest to points x + i y (n,), by algebraic least squares."""
-    A = np.stack([2.0 * z.real, 2.0 * z.imag, np.ones(z.size)], axis=1)
-    (a, b, c), *_ = np.linalg.lstsq(A, z.real * z.real + z.imag * z.imag, rcond=None)
-    return complex(a, b), float(np.sqrt(max(c + a * a + b * b, 0.0)))
 
 
 def _centre(z: ComplexArray) -> complex:

@@ -10,7 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 from discsim.arrays import FloatArray
 from discsim.estimators.rate import YawRate
 from discsim.recording import Samples
-from discsim.validation.diagnosis.detectors.sample_alignment import circle_through
+from discsim.validation.identification.circle import circle_through
 
 __all__ = ["field_phase", "phase_rate", "turned", "turned_by_rate"]
 
