@@ -13,6 +13,7 @@ from dataclasses import replace
 from discsim.effects.catalogue import catalogued
 from discsim.effects.mount_rows import Mount
 from discsim.effects.sensors import SoftIron
+from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.evidence import lead, price
@@ -64,4 +65,7 @@ def _with_the_other(found: Search) -> Search:
     both = found.with_cost(both)
     if not possible(both) or both.gain_upon(final) <= price(other):
         return found
-    return replace(found, final=both, rivals={})
+    # a fit that goes on may gain elsewhere, by what it had not yet found
+    about = found.about(both.fit)
+    worth = worth_of_each(about.equations, both.hypothesis.candidates, found.own)[other.name]
+    return replace(found, final=both, rivals={}) if worth > price(other) else found
