@@ -33,9 +33,13 @@ _RATE_NAME = re.compile(
 _RATE_UNITS: Mapping[str, float] = MappingProxyType(
     {"rad/s": 1.0, "deg/s": _DEG, "°/s": _DEG, "dps": _DEG, "rpm": _RPM, "hz": 2.0 * np.pi}
 )
-#: other names of a time, as Time (s), t_ms or timestamp, and seconds per unit
-_TIME_NAME = re.compile(r"(?:timestamp|time|t)[ _]?[(\[]?(s|sec|seconds|ms|us|µs)?[)\]]?", re.I)
-_TIME_UNITS: Mapping[str, float] = MappingProxyType({"ms": 1e-3, "us": 1e-6, "µs": 1e-6})
+#: other names of a time, as Time (s), t_ms, timestamp, or the unit alone as boards call their counter; s per unit
+_TIME_NAME = re.compile(
+    r"(?:timestamp|time|t)[ _]?[(\[]?(s|sec|seconds|ms|us|µs)?[)\]]?|(seconds|ms|millis|us|micros)(?:\(\))?", re.I
+)
+_TIME_UNITS: Mapping[str, float] = MappingProxyType(
+    {"ms": 1e-3, "millis": 1e-3, "us": 1e-6, "µs": 1e-6, "micros": 1e-6}
+)
 #: what stands between cells, in the order in which it is looked for in a header; a comma is in numbers beside the first
 _BETWEEN = (";", "\t", ",")
 #: methods that give magnitudes, as `estimate` writes them
@@ -137,7 +141,7 @@ def _time_column(header: Sequence[str]) -> tuple[int | None, float]:
         return header.index("time_s"), 1.0
     named = ((k, found) for k, cell in enumerate(header) if (found := _TIME_NAME.fullmatch(cell)))
     for k, found in named:
-        return k, _TIME_UNITS.get((found[1] or "s").lower(), 1.0)
+        return k, _TIME_UNITS.get((found[1] or found[2] or "s").lower(), 1.0)
     return None, 1.0
 
 

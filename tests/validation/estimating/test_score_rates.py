@@ -161,6 +161,8 @@ def test_a_truth_is_one_rate_over_time(tmp_path):
         ("Time (ms), Spin rate (deg/s)\n0,90\n500,180\n", 0.5, np.pi),
         ("t_us;spin_dps\n0;90,0\n500000;180,0\n", 0.5, np.pi),
         ("timestamp\tyaw_rate_rpm\n0\t30\n0.5\t60\n", 0.5, 2 * np.pi),
+        ("ms,rpm\n48000,30\n48500,60\n", 48.5, 2 * np.pi),
+        ("micros,dps\n0,90\n500000,180\n", 0.5, np.pi),
     ],
 )
 def test_other_names_units_and_separators_that_say_the_same_are_read(tmp_path, text, t, spin):
