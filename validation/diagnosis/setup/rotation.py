@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
+from discsim.validation.diagnosis.setup.axis_by_pull import axis_by_pull
 from discsim.validation.diagnosis.setup.spin_signals import averages, turning_line, usable
 
 __all__ = ["board_turns", "spin_axis"]
@@ -61,6 +62,8 @@ def board_turns(recordings: Sequence[Recording]) -> list[FloatArray]:
     axis = spin_axis(recordings, "gyroscope")
     if axis is None:
         axis = spin_axis(recordings, "magnetometer")
+    if axis is None:
+        axis = axis_by_pull(recordings)
     if axis is None:
         return []
     pull = _pull(recordings, axis)
