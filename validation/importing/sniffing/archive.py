@@ -50,9 +50,9 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
 
     What is in gzip stands there without that ending. In a folder a receiver's track (NMEA, GPX) becomes a table under
     its own name beside the other files; so does what is JSON, there and by itself, and sentences that a log has between
-    its lines. ``say`` is told what was left out of
-    a log of messages, and of JSON. Raises `InputError` for no such file, a damaged zip or gzip, one with a password,
-    one with paths that lead out of it or links, one above the limits, a log that cannot be read.
+    its lines. ``say`` is told what was left out of a log of messages, and of JSON. Raises `InputError` for no such
+    file, a damaged zip or gzip, one with a password, one with paths that lead out of it or links, one above the limits,
+    a log that cannot be read.
     """
     if not raw.exists():
         raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")

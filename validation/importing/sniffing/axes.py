@@ -192,11 +192,11 @@ def _laid(sensors: Mapping[str, Reading3], spin: int | None, field_down: float |
         why = f"the gyroscope leaves {100 * best.ratio:.0f} % of the field's changes whichever way they lie"
         return _by_sense(sensors, spin, why)
     alike = [fit for fit in fits if fit.overall * APART <= best.overall]
+    others = "" if len(alike) <= 2 else f"; {len(alike) - 1} other ways fit as well"
     if any(np.array_equal(fit.axes, np.eye(3)) for fit in alike):
         same = fits[[np.array_equal(fit.axes, np.eye(3)) for fit in fits].index(True)]
         sure: Sureness = "certain" if len(alike) <= 2 and same.ratio < CLEARLY else "likely"
-        why = f"so the field turns as the gyroscope says ({100 * same.ratio:.0f} % of its changes left)"
-        why += "" if len(alike) <= 2 else f"; {len(alike) - 1} other ways fit as well"
+        why = f"so the field turns as the gyroscope says ({100 * same.ratio:.0f} % of its changes left){others}"
         up = _upward(sensors["magnetometer"], sensors.get("accelerometer"), same.offset)
         # where the place is known the import looks at all of the rest, and warns
         note = UPWARD if field_down is None and up > UP * _size(sensors["magnetometer"], same.offset) else ""
@@ -205,7 +205,7 @@ def _laid(sensors: Mapping[str, Reading3], spin: int | None, field_down: float |
     named = " ".join(letters(chosen.axes))
     left = next(f.ratio for f in fits if np.array_equal(f.axes, np.eye(3)))
     why = f"{100 * chosen.ratio:.0f} % of the field's changes are left, {100 * left:.0f} % if they lay as written{by}"
-    why += "" if len(alike) <= 2 else f"; {len(alike) - 1} other ways fit as well"
+    why += others
     decision = Decision(what, f"{named} in the gyroscope's", "likely" if len(alike) <= 2 else "guess", why)
     return _Laid(chosen.axes, decision, MIRRORED if np.linalg.det(chosen.axes) < 0 else "")
 
@@ -256,13 +256,19 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
 
 def _upward(field: Reading3, accel: Reading3 | None, offset: FloatArray | float = 0.0) -> float:
     """Return the field's component against gravity at rest, uT, less an offset (3,); 0 where no rest is known."""
+    rest = _at_rest(field, accel)
+    return 0.0 if rest is None else float(np.nanmedian(np.sum((rest[0] - offset) * rest[1], axis=1)))
+
+
+def _at_rest(field: Reading3, accel: Reading3 | None) -> tuple[FloatArray, FloatArray] | None:
+    """Return the field (n, 3) uT and the upward direction (n, 3) of the rows at rest; None where no rest is known."""
     if accel is None:
-        return 0.0
+        return None
     still = resting(accel, None)
     if still.sum() < 10:
-        return 0.0
-    there = np.column_stack([np.interp(accel.t[still], field.t, field.value[:, k]) for k in range(3)]) - offset
-    return float(np.nanmedian(np.sum(there * accel.value[still], axis=1))) / G0
+        return None
+    t = accel.t[still]
+    return np.column_stack([np.interp(t, field.t, field.value[:, k]) for k in range(3)]), accel.value[still] / G0
 
 
 def _size(field: Reading3, offset: FloatArray) -> float:
@@ -277,22 +283,17 @@ def _of_two(alike: list[Fit], field: Reading3, accel: Reading3 | None, field_dow
     """
     least = min(fit.overall for fit in alike)
     same = [fit for fit in alike if fit.overall <= SAME * least]
-    ranked = sorted(
+    best = min(
         same,
         key=lambda fit: (np.linalg.det(fit.axes) < 0, " ".join(letters(fit.axes)) not in OF_PARTS, -np.trace(fit.axes)),
     )
-    best = ranked[0]
     pair = [fit for fit in alike if np.array_equal(fit.axes, best.axes) or np.array_equal(fit.axes, -best.axes)]
-    if accel is None or len(pair) < 2:
+    rest = _at_rest(field, accel)
+    if rest is None or len(pair) < 2:
         return best, ""
-    still = resting(accel, None)
-    if still.sum() < 10:
-        return best, ""
-    t, up = accel.t[still], accel.value[still] / G0
-    there = np.column_stack([np.interp(t, field.t, field.value[:, k]) for k in range(3)])
+    there, up = rest
     upward = [float(np.median(np.sum((there @ fit.axes.T - fit.offset) * up, axis=1))) for fit in pair]
-    if field_down is None or abs(field_down) < UP:
-        return pair[int(np.argmin(upward))], "; of this and all three reversed, this has the field point down at rest"
-    way = "down" if field_down > 0 else "up"
-    by = f"; of this and all three reversed, this has the field point {way} at rest, as it does there"
-    return pair[int(np.argmin(np.sign(field_down) * np.array(upward)))], by
+    down = field_down or 0.0
+    sign, way = (-1.0, "up") if down <= -UP else (1.0, "down")
+    by = f"; of this and all three reversed, this has the field point {way} at rest"
+    return pair[int(np.argmin(sign * np.array(upward)))], by + ", as it does there" * (abs(down) >= UP)

@@ -59,8 +59,8 @@ class Fit(NamedTuple):
     """What is left of the vector's changes (a ratio: 0 all explained, 1 nothing), by which axes, worth, offset.
 
     ``overall`` is the geometric mean of what is left over all steps of `LAGS`, by which ways are ranked. ``size`` is
-    that of the vector without its offset, over that of what is read. ``sharp``: by the turns alone
-    a worth that is a quarter larger or smaller explains much less; else it rests on that size.
+    that of the vector without its offset, over that of what is read. ``sharp``: by the turns alone a worth that is a
+    quarter larger or smaller explains much less; else it rests on that size.
     """
 
     ratio: float
@@ -182,6 +182,7 @@ class _Sums:
 
 
 def _offset(normal: FloatArray, seen_by: FloatArray, limit: float) -> FloatArray:
+    """Return the offsets (3, w) that leave least by some sums, as those of `_Sums`, each at most a ``limit`` long."""
     # squared, what a singular value of 1e-3 of the largest is
     offset = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ seen_by
     return np.asarray(offset * np.minimum(1.0, limit / np.maximum(np.linalg.norm(offset, axis=0), 1e-300)))
