@@ -36,6 +36,10 @@ from discsim.recording import PLANTS, Recording, Samples
 from discsim.validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
 from discsim.validation.challenge.cases.conceal import recordings as simulated
 from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.diagnosis.candidates.candidate import parameters_of
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate, screened_candidates
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.gusts import gusts
 from discsim.validation.diagnosis.detectors.local_problem import local_problems
@@ -44,10 +48,6 @@ from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
 from discsim.validation.diagnosis.inertia import with_inertia
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.prepared import prepared
-from discsim.validation.diagnosis.selection.candidates import parameters_of
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, screened_candidates
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened

@@ -88,7 +88,7 @@ from discsim.validation.challenge.cases.sizes import conceivable
 from discsim.validation.commands.fly import command as fly
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.report.wording import form, name_of
-from discsim.validation.diagnosis.selection.candidates import candidates_for
+from discsim.validation.diagnosis.candidates.candidate import candidates_for
 from discsim.validation.identification.linearisation import linearise
 from discsim.validation.identification.plants.flight import FLIGHT
 

@@ -16,13 +16,15 @@ from discsim.effects.rig import AxisTilt
 from discsim.model_file import Model, ModelEffect
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.misstated import sentence
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, in_parameters, parameters_of
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, standard_errors
+from discsim.validation.diagnosis.candidates.evidence import price
 from discsim.validation.diagnosis.command_followed import not_as_commanded
 from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
 from discsim.validation.diagnosis.design.next_recording import BY_HAND, advise, confusions, in_words
 from discsim.validation.diagnosis.detectors.even_losses import beside_losses, lost_as_well, rather_lost
-from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
 from discsim.validation.diagnosis.partly import partly_explained
@@ -48,16 +50,14 @@ from discsim.validation.diagnosis.result import (
     Residuals,
 )
 from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, standard_errors
-from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import tried_without
+from discsim.validation.diagnosis.selection.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from discsim.validation.diagnosis.selection.search_state import Considered, Search, chi2_in
+from discsim.validation.diagnosis.selection.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.diagnosis.settings import settings_told
 from discsim.validation.diagnosis.setup import suspected_fault
 from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
 from discsim.validation.diagnosis.stages import Judged, Question
-from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw
 from discsim.validation.diagnosis.verdict import recalibrations
 from discsim.validation.identification.gauss_newton import Fit

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.diagnosis.candidates.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.identification.gauss_newton import Fit, refit
 

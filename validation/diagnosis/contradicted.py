@@ -10,8 +10,8 @@ from discsim.arrays import FloatArray
 from discsim.model_file import Model
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.driven import Turning
-from discsim.validation.diagnosis.consistency.early_verdict import Contradiction, Look
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
+from discsim.validation.diagnosis.early_verdict import Contradiction, Look
 from discsim.validation.diagnosis.result import Diagnosis, FitFigures, Located, Outcome, Residuals
 from discsim.validation.diagnosis.settings import settings_told
 

@@ -16,7 +16,7 @@ from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.driven import turning_of
-from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, rate_of
+from discsim.validation.diagnosis.signals.phase_regression import angle_turned, rate_of
 from discsim.validation.identification.plants import plant_of
 
 __all__ = ["with_inertia"]

@@ -16,9 +16,9 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.validation.diagnosis.answer.leftover import Leftover
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.candidates.evidence import BOUNDS
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
-from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import CONSISTENCY
 from discsim.validation.identification.gauss_newton import Fit, reduced_each, refit

@@ -8,12 +8,12 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.continuous_fit import standard_errors
+from discsim.validation.diagnosis.candidates.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.result import Located
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.continuous_fit import standard_errors
-from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.search_state import Search
-from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
+from discsim.validation.diagnosis.selection.uninflated_noise import uninflated_noise
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.normal_equations import nuisance_step, reduce
 

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.validation.diagnosis.answer.misstated import Misstated
-from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit, standard_errors
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit, standard_errors
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.early_verdict import contradiction_in
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, hopeless, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened

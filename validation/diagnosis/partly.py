@@ -14,11 +14,11 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.answer.named import ParameterValue
 from discsim.validation.diagnosis.answer.partly import PartlyExplained
-from discsim.validation.diagnosis.held_out import heldout_chi2
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, in_parameters
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.leftovers import heldout_fits
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.selection.held_out import heldout_chi2
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.identification.gauss_newton import refit

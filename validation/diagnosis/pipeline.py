@@ -12,10 +12,11 @@ from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
 from discsim.validation.diagnosis.bent_segments import with_bends_followed
-from discsim.validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
+from discsim.validation.diagnosis.candidates.candidate import stand_ins
+from discsim.validation.diagnosis.consistency.row_times import row_times
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of, compared
 from discsim.validation.diagnosis.datasets import recording_names, recordings_of
-from discsim.validation.diagnosis.detectors.row_times import row_times
+from discsim.validation.diagnosis.early_verdict import contradiction_after, contradiction_in
 from discsim.validation.diagnosis.inertia import with_inertia
 from discsim.validation.diagnosis.misstated import reconciling
 from discsim.validation.diagnosis.prepared import prepared
@@ -24,7 +25,6 @@ from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
 from discsim.validation.diagnosis.result import Outcome
-from discsim.validation.diagnosis.selection.candidates import stand_ins
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.refitted_out_of_balance import refitted_out_of_balance

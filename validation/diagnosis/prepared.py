@@ -14,9 +14,9 @@ from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.rounded_stamps import evened, unit_of
 from discsim.validation.checking.track_path import holds_height
+from discsim.validation.diagnosis.candidates.candidate import unplaced
 from discsim.validation.diagnosis.late_stamps import with_even_rows
 from discsim.validation.diagnosis.repeats import without_held_readings
-from discsim.validation.diagnosis.selection.candidates import unplaced
 from discsim.validation.diagnosis.throw_ends import coasting_part, free_part
 from discsim.validation.diagnosis.track_ends import flight_of
 from discsim.validation.identification.coarse_steps import stands

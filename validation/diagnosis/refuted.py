@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.candidates.evidence import price
+from discsim.validation.diagnosis.candidates.own_sizes import own_sizes
 from discsim.validation.diagnosis.detectors.even_losses import lost_as_well, rather_lost
-from discsim.validation.diagnosis.held_out import choices_without_each, heldout_gain
 from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
-from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import rivals_of, tried_without
-from discsim.validation.diagnosis.selection.own_sizes import own_sizes
+from discsim.validation.diagnosis.selection.held_out import choices_without_each, heldout_gain
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.diagnosis.verdict import leaves_more_than_noise

@@ -13,6 +13,7 @@ from discsim.effects.sensors import ClockRate
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.answer.misstated import Misstated
+from discsim.validation.diagnosis.candidates.continuous_fit import standard_errors
 from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
 from discsim.validation.diagnosis.misstated import misstated
 from discsim.validation.diagnosis.progress import Progress
@@ -20,7 +21,6 @@ from discsim.validation.diagnosis.result import (
     Recalibration,
     Verdict,
 )
-from discsim.validation.diagnosis.selection.continuous_fit import standard_errors
 from discsim.validation.diagnosis.selection.search_state import Search, misses
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Tried

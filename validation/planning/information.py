@@ -16,9 +16,9 @@ from discsim.arrays import FloatArray
 from discsim.disc import Aero
 from discsim.errors import InputError
 from discsim.recording import Recording
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, available, candidates_for, free_candidate
+from discsim.validation.diagnosis.candidates.screening import columns_about
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, available, candidates_for, free_candidate
-from discsim.validation.diagnosis.selection.screening import columns_about
 from discsim.validation.identification.gauss_newton import Fit, linearised, linearised_columns
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import GroupNoise, NoiseModel, stated_noise

@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from discsim.arrays import FloatArray
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.candidates.evidence import price
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.planning.information import Information, inverse
 

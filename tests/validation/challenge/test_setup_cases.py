@@ -18,7 +18,7 @@ from discsim.validation.challenge.cases.detection_limit import sizes
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
 from discsim.validation.challenge.cases.sizes import HIDING, ordinary
-from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
+from discsim.validation.diagnosis.early_verdict import contradiction_in
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault

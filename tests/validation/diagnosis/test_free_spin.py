@@ -18,6 +18,10 @@ from discsim.sensors import record
 from discsim.shipped import load_disc
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.diagnosis.candidates.candidate import free_candidate
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.score_tests import hinted
 from discsim.validation.diagnosis.detectors.dropped_samples import dropped_magnetometer
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.local_problem import local_problems
@@ -26,11 +30,7 @@ from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection import refitted_out_of_balance as of_balance
 from discsim.validation.diagnosis.selection import stepwise
-from discsim.validation.diagnosis.selection.candidates import free_candidate
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.next_effect import joined
-from discsim.validation.diagnosis.selection.score_tests import hinted
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, possible, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened

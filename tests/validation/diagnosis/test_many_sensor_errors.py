@@ -16,7 +16,7 @@ from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import chi2_in
 from discsim.validation.diagnosis.selection.starting_point import screened
-from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
+from discsim.validation.diagnosis.selection.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.identification.noise import GroupNoise
 
 RIPPLE = effect("rig.speed_ripple", order=6.0, amplitude_rad_s=1.2, phase_rad=0.7)

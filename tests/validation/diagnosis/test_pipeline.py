@@ -17,7 +17,7 @@ from discsim.sensors import Instruments, record
 from discsim.validation.challenge.cases.hidden_physics import coast, haunted
 from discsim.validation.challenge.cases.off_catalogue import MainsField
 from discsim.validation.diagnosis import pipeline, stages
-from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
+from discsim.validation.diagnosis.early_verdict import contradiction_in
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.setup import SetupFault, SetupFindings
 from discsim.written import corrected

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from discsim.validation.diagnosis.assemble import reason_for
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.candidates.evidence import price
 from discsim.validation.diagnosis.selection.search_state import Considered
 
 BIAS, IMPULSE = CandidateEffect("gyro.bias", ()), CandidateEffect("event.impulse", ())

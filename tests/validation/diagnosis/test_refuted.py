@@ -15,10 +15,10 @@ from discsim.rig import spin_down
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis import refuted
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.own_sizes import own_sizes
 from discsim.validation.diagnosis.refuted import without_refuted
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened

@@ -10,10 +10,10 @@ import pytest
 from support.made import MODULE, throws
 
 from discsim.recording import Recording
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, standard_errors
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, standard_errors
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.stated_parameters import stated_parameters

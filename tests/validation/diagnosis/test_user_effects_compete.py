@@ -28,10 +28,10 @@ from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
 from discsim.validation.cli import main
+from discsim.validation.diagnosis.candidates.candidate import available, candidates_for, parameters_of
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.result import Diagnosis
-from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.linearisation import linearise
 from discsim.validation.identification.prediction import shown

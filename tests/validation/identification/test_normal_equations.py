@@ -91,7 +91,7 @@ NO_NORMAL_EQUATIONS = {
     "identification/normal_equations.py": "the solver itself, and the root of a matrix that rounding made indefinite",
     "identification/initial/spin_phase.py": "the axes of an ellipse",
     "diagnosis/setup/rotation.py": "the axis about which a sensor turns",
-    "diagnosis/setup/relations.py": "the error of one of three coefficients of a regression",
+    "diagnosis/signals/relations.py": "the error of one of three coefficients of a regression",
 }
 
 

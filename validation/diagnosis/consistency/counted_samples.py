@@ -15,7 +15,7 @@ import numpy as np
 from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import (
+from discsim.validation.diagnosis.signals.phase_regression import (
     rate_of,
     signal_of,
     slow_columns,

@@ -31,7 +31,7 @@ from discsim.validation.diagnosis.consistency.late_rows import (
     rows_decided,
 )
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, SamplesShown
-from discsim.validation.diagnosis.consistency.phase_regression import (
+from discsim.validation.diagnosis.signals.phase_regression import (
     retimed,
     signal_of,
     slow_columns,

@@ -18,7 +18,7 @@ from discsim.arrays import ComplexArray, FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, centripetal_of
+from discsim.validation.diagnosis.signals.phase_regression import angle_turned, centripetal_of
 from discsim.validation.identification.plants import plant_of
 
 __all__ = ["LowPassTransient", "TransientProof", "low_pass_transient_of"]

@@ -27,12 +27,12 @@ from discsim.validation.diagnosis.consistency.counted_samples import (
     rms,
     unslipped,
 )
-from discsim.validation.diagnosis.consistency.phase_regression import (
+from discsim.validation.diagnosis.consistency.skipped_samples import OFF, Loops, loops_beside
+from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
+from discsim.validation.diagnosis.signals.phase_regression import (
     retimed,
     signal_of,
 )
-from discsim.validation.diagnosis.consistency.skipped_samples import OFF, Loops, loops_beside
-from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 from discsim.validation.identification.circle import circle_centre
 
 __all__ = ["MOST_ROWS", "OwnClock", "SamplesShown", "own_clock_of", "too_many"]

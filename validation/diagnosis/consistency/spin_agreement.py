@@ -22,7 +22,8 @@ from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.imu_clock import ImuClock, imu_clock_of
 from discsim.validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
 from discsim.validation.diagnosis.consistency.own_clock import MOST_ROWS, OwnClock, own_clock_of, too_many
-from discsim.validation.diagnosis.consistency.phase_regression import (
+from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows, rows_of
+from discsim.validation.diagnosis.signals.phase_regression import (
     REACH,
     angle_turned,
     centripetal,
@@ -34,7 +35,6 @@ from discsim.validation.diagnosis.consistency.phase_regression import (
     steps,
     tone,
 )
-from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows, rows_of
 
 __all__ = ["Agreement", "Cause", "Comparison", "Proof", "RowProof", "agreement_of", "compared", "written_ratios"]
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.recording import Recording
-from discsim.validation.diagnosis.setup.relations import Columns, misfits
-from discsim.validation.diagnosis.setup.spin_signals import spin_signals
+from discsim.validation.diagnosis.signals.relations import Columns, misfits
+from discsim.validation.diagnosis.signals.spin_signals import spin_signals
 
 __all__ = ["APART", "RatesApart", "rates_apart"]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import (
+from discsim.validation.diagnosis.signals.phase_regression import (
     angle_turned,
     retimed,
     signal_of,

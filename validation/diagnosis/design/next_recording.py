@@ -19,11 +19,11 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.rig import AxisTilt
 from discsim.recording import SENSORS, Recording, Samples
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.candidates.evidence import BOUNDS
 from discsim.validation.diagnosis.design.plans import plans_about
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.result import Advice, Separation
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.search_state import Rival, Search
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, mapped

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.gusts import gusts
@@ -14,8 +16,6 @@ from discsim.validation.diagnosis.detectors.local_problem import local_problems
 from discsim.validation.diagnosis.detectors.saturation import saturation
 from discsim.validation.diagnosis.detectors.speed_ripple import ripple
 from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.settings import DETECTORS
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import NoiseModel

@@ -13,6 +13,8 @@ import numpy as np
 from discsim.arrays import FloatArray, sd_of_share
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.detectors.sample_alignment import (
     ROOM,
     Alignment,
@@ -27,8 +29,6 @@ from discsim.validation.diagnosis.detectors.sample_alignment import (
     told_of,
 )
 from discsim.validation.diagnosis.relaxed_fit import relaxed
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.settings import DETECTORS
 from discsim.validation.identification.gauss_newton import Fit, mapped, refit
 from discsim.validation.identification.noise import NoiseModel

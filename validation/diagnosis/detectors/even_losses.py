@@ -14,6 +14,9 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import ClockRate, DroppedSamples
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.continuous_fit import wider_with
+from discsim.validation.diagnosis.candidates.own_sizes import own_sizes
 from discsim.validation.diagnosis.detectors.dropped_samples import price_of_places
 from discsim.validation.diagnosis.detectors.walk_of_losses import (
     by_one_sample,
@@ -21,9 +24,6 @@ from discsim.validation.diagnosis.detectors.walk_of_losses import (
     place_of,
     sd_of_axes,
 )
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.continuous_fit import wider_with
-from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.readings import Readings
 from discsim.validation.identification.sensor_model import delay

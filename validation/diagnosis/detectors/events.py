@@ -15,9 +15,9 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Row, catalogued
 from discsim.effects.events import EVENT_WIDTH_S, Impulse, SpinStep
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, detected
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.detectors.local_problem import LocalProblem, LocalProblems, gain_of, peaks
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, detected
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.settings import DETECTORS
 from discsim.validation.identification.gauss_newton import Fit, mapped
 from discsim.validation.identification.linearisation import linearise

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, detected
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.detectors.local_problem import WIND, LocalProblem, LocalProblems, gain_of
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, detected
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.settings import DETECTORS
 from discsim.validation.identification.gauss_newton import mapped
 from discsim.validation.identification.propagation import Column

@@ -14,9 +14,9 @@ import numpy as np
 from discsim.arrays import FloatArray, IntArray
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.identification.gauss_newton import Fit, linearised
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, whitened

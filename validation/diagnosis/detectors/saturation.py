@@ -12,8 +12,8 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import AccelerometerSaturation
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.identification.clipping import clipping_level, equal_beyond_chance
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import NoiseModel

@@ -13,9 +13,9 @@ from scipy.integrate import cumulative_trapezoid
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.rig import SpeedRipple
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.detectors.local_problem import gain_of, peaks
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.settings import DETECTORS
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import NoiseModel

@@ -16,8 +16,8 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.effects.setup import TimeOffset
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.settings import DETECTORS
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import NoiseModel

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
 from discsim.validation.identification.gauss_newton import Fit, mapped
 from discsim.validation.identification.noise import NoiseModel
 from discsim.validation.identification.prediction import read, shown

@@ -1,1 +1,1 @@
-"""Which effects explain the recordings: candidates, score tests, stepwise selection by likelihood."""
+"""Which effects explain the recordings: stepwise selection by likelihood, and the evidence on what is held out."""

@@ -15,12 +15,12 @@ from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.mount_rows import Mount
 from discsim.effects.sensors import CrossAxis, HardIron, Lag
 from discsim.effects.setup import BoardRotation
-from discsim.validation.diagnosis.held_out import heldout_chi2
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import NESTED, TURNED, lead, price
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
-from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.evidence import NESTED, TURNED, lead, price
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.candidates.screening import NormalEquations, normal_equations_of
+from discsim.validation.diagnosis.selection.held_out import heldout_chi2
 from discsim.validation.diagnosis.selection.search_state import (
     Search,
     chi2_in,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit
 from discsim.validation.identification.gauss_newton import Fit
 
 __all__ = ["Refitted", "best_of"]

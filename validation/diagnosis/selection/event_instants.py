@@ -13,7 +13,7 @@ import numpy as np
 
 from discsim.effects.catalogue import catalogued
 from discsim.effects.events import Impulse
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.search_state import Search, far, values_of_fit
 from discsim.validation.identification.gauss_newton import Bars, merit_of
 from discsim.validation.identification.instant_profile import instant_profile, instants_of, with_errors_of_instants

@@ -9,18 +9,18 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import IN_PLACE, lead, price
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from discsim.validation.diagnosis.selection.refits import refitting
-from discsim.validation.diagnosis.selection.score_tests import (
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.evidence import IN_PLACE, lead, price
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.candidates.score_tests import (
     ScreenedCandidate,
     backwards,
     scope_price,
     start_of,
 )
-from discsim.validation.diagnosis.selection.screening import free_columns
+from discsim.validation.diagnosis.candidates.screening import free_columns
+from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.search_state import (
     Rival,
     Search,

@@ -10,21 +10,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.validation.diagnosis.detectors.all import searched
-from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
-from discsim.validation.diagnosis.selection.best_refit import Refitted, best_of
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, price
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start
-from discsim.validation.diagnosis.selection.offers import Offer, begun_as_tried, in_chi2, in_turn
-from discsim.validation.diagnosis.selection.refits import refitting
-from discsim.validation.diagnosis.selection.score_tests import (
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, in_parameters, parameters_of
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.evidence import ONE_SIDED, TURNED, price
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, Start
+from discsim.validation.diagnosis.candidates.score_tests import (
     ScreenedCandidate,
     one_per_effect,
     pairs,
     screened_candidates,
 )
+from discsim.validation.diagnosis.detectors.all import searched
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
+from discsim.validation.diagnosis.selection.best_refit import Refitted, best_of
+from discsim.validation.diagnosis.selection.offers import Offer, begun_as_tried, in_chi2, in_turn
+from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.search_state import (
     Considered,
     Search,

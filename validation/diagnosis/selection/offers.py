@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from typing import TypeAlias
 
-from discsim.validation.diagnosis.selection.evidence import charge, price
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.candidates.evidence import charge, price
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.identification.gauss_newton import Fit
 
 __all__ = ["Offer", "begun_as_tried", "in_chi2", "in_turn"]

@@ -10,6 +10,9 @@ from dataclasses import replace
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.effects.setup import TimeOffset
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.evidence import price
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.detectors.dropped_samples import (
     Shifted,
     begun_later,
@@ -20,10 +23,7 @@ from discsim.validation.diagnosis.detectors.dropped_samples import (
 )
 from discsim.validation.diagnosis.detectors.even_losses import rather_lost
 from discsim.validation.diagnosis.detectors.walk_of_losses import price_of_walk, walked
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import in_reach
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.identification.gauss_newton import Fit
 

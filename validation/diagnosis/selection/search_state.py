@@ -10,13 +10,13 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.events import SpinStep
 from discsim.recording import Recording
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.candidates.evidence import ONE_SIDED, holds_itself
+from discsim.validation.diagnosis.candidates.hypothesis import Start
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.candidates.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.detectors.dropped_samples import LostSamples
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
-from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, holds_itself
-from discsim.validation.diagnosis.selection.hypothesis import Start
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
-from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, Fit
 from discsim.validation.identification.noise import NoiseModel, chi_squared, robust_noise

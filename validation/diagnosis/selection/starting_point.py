@@ -7,17 +7,17 @@ from dataclasses import replace
 
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, candidates_for
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.candidates.score_tests import hinted, pictured_from_above, start_of
+from discsim.validation.diagnosis.candidates.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.astray import from_nearer_motion, from_other_flights
 from discsim.validation.diagnosis.relaxed_fit.clocks import clock_of_accelerometer
 from discsim.validation.diagnosis.relaxed_fit.outliers import without_outliers
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
-from discsim.validation.diagnosis.selection.score_tests import hinted, pictured_from_above, start_of
-from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, hopeless, values_of_fit, wobbles
 from discsim.validation.diagnosis.settings import SELECTION

@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.effects.kind import BOARD
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.evidence import price
+from discsim.validation.diagnosis.candidates.score_tests import plans_alone
 from discsim.validation.diagnosis.first_trajectory import time_ratio
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.each_its_own import with_own_sizes
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant
-from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import (
     eliminated_backward,
     exchanged,
@@ -29,7 +30,6 @@ from discsim.validation.diagnosis.selection.exchange import (
 )
 from discsim.validation.diagnosis.selection.next_effect import next_effect, next_two
 from discsim.validation.diagnosis.selection.recounting import with_losses_recounted
-from discsim.validation.diagnosis.selection.score_tests import plans_alone
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import (
     Search,
@@ -41,8 +41,8 @@ from discsim.validation.diagnosis.selection.search_state import (
     values_of_fit,
 )
 from discsim.validation.diagnosis.selection.starting_point import screened
+from discsim.validation.diagnosis.selection.uninflated_noise import spoilt_groups, uninflated_noise
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
-from discsim.validation.diagnosis.uninflated_noise import spoilt_groups, uninflated_noise
 from discsim.validation.identification.noise import stated_noise
 from discsim.validation.identification.residual_tests import loudest
 

@@ -13,10 +13,10 @@ from dataclasses import replace
 from discsim.effects.catalogue import catalogued
 from discsim.effects.mount_rows import Mount
 from discsim.effects.sensors import SoftIron
+from discsim.validation.diagnosis.candidates.candidate import free_candidate
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.evidence import lead, price
 from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
-from discsim.validation.diagnosis.selection.candidates import free_candidate
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.evidence import lead, price
 from discsim.validation.diagnosis.selection.exchange import rival_of
 from discsim.validation.diagnosis.selection.search_state import Search, possible, values_of_fit
 from discsim.validation.diagnosis.settings import SELECTION

@@ -15,7 +15,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from discsim.validation.diagnosis.setup.spin_signals import averages, usable
+from discsim.validation.diagnosis.signals.spin_signals import averages, usable
 
 __all__ = ["axis_by_pull"]
 

@@ -20,9 +20,9 @@ from discsim.effects.setup import Axes, BoardRotation, axes_of
 from discsim.estimators.fusion import mostly_clipped, slow_field, unfolding
 from discsim.recording import Recording
 from discsim.validation.diagnosis.settings import RELAXED_FIT
-from discsim.validation.diagnosis.setup.relations import Columns, misfit, wanted_force
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
-from discsim.validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
+from discsim.validation.diagnosis.signals.relations import Columns, misfit, wanted_force
+from discsim.validation.diagnosis.signals.spin_signals import SpinSignals, spin_signals
 from discsim.validation.identification.ordinary_errors import ordinary_sigma
 from discsim.validation.identification.plants import plant_of
 from discsim.written import corrected

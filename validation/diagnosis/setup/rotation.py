@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
 from discsim.validation.diagnosis.setup.axis_by_pull import axis_by_pull
-from discsim.validation.diagnosis.setup.spin_signals import averages, turning_line, usable
+from discsim.validation.diagnosis.signals.spin_signals import averages, turning_line, usable
 
 __all__ = ["board_turns", "spin_axis"]
 

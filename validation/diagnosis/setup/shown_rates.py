@@ -17,7 +17,7 @@ from discsim.effects.sensors import PositionOffset, Scale
 from discsim.errors import InputError
 from discsim.estimators.tracking import tracking
 from discsim.recording import Recording, Samples
-from discsim.validation.diagnosis.setup.spin_signals import FEWEST, spin_signals, usable
+from discsim.validation.diagnosis.signals.spin_signals import FEWEST, spin_signals, usable
 from discsim.validation.identification.ordinary_errors import ordinary_errors
 
 __all__ = ["FEWEST_SLOTS", "ORDINARY", "Multiple", "ShownRate", "shown_rates"]

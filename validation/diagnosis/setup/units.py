@@ -21,7 +21,7 @@ from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, Gyroscope
 from discsim.estimators.fusion import slow_field
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording, Samples
-from discsim.validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
+from discsim.validation.diagnosis.signals.spin_signals import FEWEST, PURE, turning_axis
 
 __all__ = ["ClockDoubt", "clock_doubts", "clock_unit", "sensor_units"]
 

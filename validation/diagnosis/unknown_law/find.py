@@ -15,11 +15,11 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.kind import BOARD
+from discsim.validation.diagnosis.candidates.candidate import parameters_of, stand_ins
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.evidence import price_of_oddity
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.result import Law
-from discsim.validation.diagnosis.selection.candidates import parameters_of, stand_ins
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import price_of_oddity
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.next_effect import next_effect
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW

@@ -9,12 +9,12 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.law import MOTION_TARGETS, WIND_TARGETS
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, noise_of, scored
+from discsim.validation.diagnosis.candidates.evidence import BOUNDS
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.screening import NormalEquations, ScoreTest, column_of
+from discsim.validation.diagnosis.candidates.to_stated import to_baseline
 from discsim.validation.diagnosis.first_trajectory import beginning
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
-from discsim.validation.diagnosis.selection.evidence import BOUNDS
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.screening import NormalEquations, ScoreTest, column_of
-from discsim.validation.diagnosis.selection.to_stated import to_baseline
 from discsim.validation.identification.gauss_newton import Fit, linearised_columns, mapped, refit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.normal_equations import reduce

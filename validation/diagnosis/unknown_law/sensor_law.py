@@ -10,10 +10,10 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from discsim.arrays import ComplexArray, FloatArray, IntArray
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.screening import NormalEquations, column_of
-from discsim.validation.diagnosis.selection.to_stated import to_baseline
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, noise_of, scored
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.screening import NormalEquations, column_of
+from discsim.validation.diagnosis.candidates.to_stated import to_baseline
 from discsim.validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
 from discsim.validation.identification.dynamics import FASTEST
 from discsim.validation.identification.gauss_newton import Fit, linearised, mapped, reduced_each, refit, whole_step

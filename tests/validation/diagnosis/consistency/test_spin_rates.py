@@ -7,8 +7,8 @@ import pytest
 from support.made import throws
 
 from discsim.recording import Samples
-from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
 from discsim.validation.diagnosis.consistency.spin_rates import APART, rates_apart
+from discsim.validation.diagnosis.early_verdict import contradiction_in
 
 
 @pytest.fixture(scope="module")

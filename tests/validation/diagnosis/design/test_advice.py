@@ -13,14 +13,14 @@ from discsim.effects import effect
 from discsim.errors import InputError
 from discsim.rig import spin_down
 from discsim.validation.diagnosis.assemble import outcome_of
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, candidates_for
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.design.next_recording import ENOUGH, advise, confusions, expected_evidence, in_words
 from discsim.validation.diagnosis.design.plans import plans_about, read_plans
 from discsim.validation.diagnosis.progress import silent
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.result import Advice, Diagnosis, Separation
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Rival, Search, values_of_fit
 from discsim.validation.diagnosis.selection.stepwise import search

@@ -14,13 +14,13 @@ from discsim.effects import Effect, effect
 from discsim.recording import Recording
 from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit, standard_errors
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.detectors.even_losses import beside_losses, lost_as_well, rather_lost
 from discsim.validation.diagnosis.detectors.walk_of_losses import evidence_of_walk
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit, standard_errors
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened

@@ -19,6 +19,8 @@ from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.detectors import dropped_samples
 from discsim.validation.diagnosis.detectors.dropped_samples import (
     begun_later,
@@ -45,8 +47,6 @@ from discsim.validation.diagnosis.detectors.speed_ripple import ripple
 from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.relaxed_fit import relaxed
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.identification.clipping import clipping_level_of, equal_beyond_chance
 from discsim.validation.identification.gauss_newton import Fit, refit
 from discsim.validation.identification.noise import estimate_noise, stated_noise

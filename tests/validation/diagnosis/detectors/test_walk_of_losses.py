@@ -13,11 +13,11 @@ from discsim.effects import effect
 from discsim.effects.catalogue import Effect
 from discsim.validation.challenge.blind import Request
 from discsim.validation.challenge.cases.conceal import recordings
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.detectors.dropped_samples import without_losses
 from discsim.validation.diagnosis.detectors.walk_of_losses import evidence_of_walk, price_of_walk, walked
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.recounting import with_losses_recounted
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from discsim.effects.sensors import CrossAxis
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.diagnosis.candidates.candidate import free_candidate, parameters_of
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.selection.all_at_once import turn_of
-from discsim.validation.diagnosis.selection.candidates import free_candidate, parameters_of
 
 
 def test_a_matrix_whose_numbers_are_opposite_in_pairs_is_the_turn_that_it_begins_with():

@@ -12,14 +12,14 @@ from support.made import RIG, coasts
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from discsim.validation.diagnosis.first_trajectory import first_trajectory
-from discsim.validation.diagnosis.selection.candidates import candidates_for
-from discsim.validation.diagnosis.selection.screening import (
+from discsim.validation.diagnosis.candidates.candidate import candidates_for
+from discsim.validation.diagnosis.candidates.screening import (
     NormalEquations,
     column_of,
     free_columns,
     normal_equations_of,
 )
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.identification.gauss_newton import Fit, linearised, linearised_columns, refit
 from discsim.validation.identification.noise import stated_noise, whitened
 from discsim.validation.identification.normal_equations import unknown_prior

@@ -11,8 +11,8 @@ from support.made import FIELD, MODULE, RIG, throws
 from discsim.effects import effect
 from discsim.rig import spin_down
 from discsim.sensors import record
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.localisation import located_effect
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant, with_instants_weighed
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import chi2_in, values_of_fit

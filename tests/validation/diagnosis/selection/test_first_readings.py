@@ -9,11 +9,11 @@ from support.made import DRIVER, MODULE, flight
 
 from discsim.recording import Samples
 from discsim.sensors import record
+from discsim.validation.diagnosis.candidates.candidate import free_candidate
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
-from discsim.validation.diagnosis.selection.candidates import free_candidate
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.identification.noise import estimate_noise
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
-from discsim.validation.diagnosis.selection.candidates import free_candidate
+from discsim.validation.diagnosis.candidates.candidate import free_candidate
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.selection.offers import Offer, begun_as_tried
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.identification.gauss_newton import Fit

@@ -11,18 +11,18 @@ from support.made import tables, throws
 
 from discsim.effects import Effect, effect
 from discsim.recording import Samples
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, candidates_for
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.candidates.score_tests import Pair, ScreenedCandidate, pairs
+from discsim.validation.diagnosis.candidates.screening import normal_equations_of
 from discsim.validation.diagnosis.design.next_recording import confusions
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection import next_effect as searching
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.exchange import exchanged, rivals_of
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.selection.next_effect import next_effect, next_two
 from discsim.validation.diagnosis.selection.offers import in_turn
-from discsim.validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
-from discsim.validation.diagnosis.selection.screening import normal_equations_of
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Rival, Search, possible
 from discsim.validation.diagnosis.selection.starting_point import screened

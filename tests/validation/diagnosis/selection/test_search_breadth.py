@@ -13,15 +13,15 @@ import pytest
 from support.made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE, effect
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, free_candidate, stand_ins
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.candidates.evidence import price
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.score_tests import ScreenedCandidate, hinted
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.selection import exchange, stepwise
 from discsim.validation.diagnosis.selection import next_effect as searching
 from discsim.validation.diagnosis.selection import search_state as finding
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate, stand_ins
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
-from discsim.validation.diagnosis.selection.evidence import price
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, hinted
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import on_the_disc
 from discsim.validation.identification.gauss_newton import Bars, Fit, linearised, merit_of

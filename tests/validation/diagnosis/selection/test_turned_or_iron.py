@@ -9,10 +9,10 @@ from support.made import MODULE, throws
 
 from discsim.effects import effect
 from discsim.effects.catalogue import Effect
+from discsim.validation.diagnosis.candidates.candidate import free_candidate
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.design.next_recording import confusions
-from discsim.validation.diagnosis.selection.candidates import free_candidate
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened

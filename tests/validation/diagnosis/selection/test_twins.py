@@ -11,8 +11,8 @@ from discsim.effects import Effect, effect
 from discsim.recording import Recording
 from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
-from discsim.validation.diagnosis.selection.candidates import free_candidate
-from discsim.validation.diagnosis.selection.evidence import charge
+from discsim.validation.diagnosis.candidates.candidate import free_candidate
+from discsim.validation.diagnosis.candidates.evidence import charge
 from discsim.validation.diagnosis.selection.exchange import takes_its_place
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search

@@ -16,15 +16,15 @@ from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_site
 from discsim.trajectory import predict
 from discsim.validation.checking.checked import check
-from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
+from discsim.validation.diagnosis.candidates.candidate import available, candidates_for, parameters_of
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, find_setup_faults, suspected_fault
 from discsim.validation.diagnosis.setup.find import may_be_physics
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, hypotheses
-from discsim.validation.diagnosis.setup.relations import Columns
 from discsim.validation.diagnosis.setup.remedy import place_instead
 from discsim.validation.diagnosis.setup_effects import free_parameters, with_reversed_axes, with_those_borne_out
+from discsim.validation.diagnosis.signals.relations import Columns
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
 from discsim.validation.scenarios.throws import Throw

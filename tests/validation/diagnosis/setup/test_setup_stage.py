@@ -20,7 +20,7 @@ from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.commands.import_ import command as import_
 from discsim.validation.diagnosis.setup import SetupFault, find_setup_faults, with_turned_board
-from discsim.validation.diagnosis.setup.spin_signals import turning_line
+from discsim.validation.diagnosis.signals.spin_signals import turning_line
 from discsim.written import as_written
 
 MAP = ROOT / "models" / "imports" / "csv.toml"

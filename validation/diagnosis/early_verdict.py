@@ -21,6 +21,7 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
+from discsim.validation.diagnosis.candidates.evidence import BOUNDS
 from discsim.validation.diagnosis.consistency.followed import left_of, left_when_shifted, left_when_turned, true_noise
 from discsim.validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
 from discsim.validation.diagnosis.detectors.dropped_samples import loses_samples
@@ -28,7 +29,6 @@ from discsim.validation.diagnosis.detectors.speed_ripple import ripple
 from discsim.validation.diagnosis.first_trajectory import beginning, first_trajectory
 from discsim.validation.diagnosis.relaxed_fit.astray import from_other_initial_states
 from discsim.validation.diagnosis.relaxed_fit.parameters import free_clocks, relaxed_parameters
-from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import CONSISTENCY
 from discsim.validation.identification.gauss_newton import Fit, refit
 from discsim.validation.identification.noise import GroupNoise

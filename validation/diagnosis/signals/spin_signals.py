@@ -2,8 +2,8 @@
 
 Takes a recording whose magnetometer has its spin axis along z; gives slow signals on an even grid: the field across and
 along the axis, and each other sensor multiplied by the field's phase and averaged over some turns (synchronous
-detection, as a lock-in amplifier does it). Physics between sensors (`discsim.validation.diagnosis.setup.relations`) are
-plain equations between these signals, whatever the columns of a sensor are called.
+detection, as a lock-in amplifier does it). Physics between sensors (`discsim.validation.diagnosis.signals.relations`)
+are plain equations between these signals, whatever the columns of a sensor are called.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import rate_of
+from discsim.validation.diagnosis.signals.phase_regression import rate_of
 from discsim.validation.identification.initial.path import Fixes, local_cubics, path_fixes
 from discsim.validation.identification.initial.spin_phase import field_spin
 from discsim.validation.identification.plants import plant_of

@@ -15,10 +15,10 @@ from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
 from discsim.effects.track_rows import Camera
 from discsim.recording import Recording
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, charge
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
-from discsim.validation.diagnosis.selection.screening import NormalEquations, ScoreTest, free_columns
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.candidates.evidence import ONE_SIDED, charge
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.candidates.screening import NormalEquations, ScoreTest, free_columns
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.propagation import Column

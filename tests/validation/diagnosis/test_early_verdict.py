@@ -15,9 +15,9 @@ from discsim.rig import default_profile, turn_table
 from discsim.sensors import Instruments, record
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
-from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
 from discsim.validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
+from discsim.validation.diagnosis.early_verdict import contradiction_in
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.settings import CONSISTENCY
 from discsim.validation.identification.observations import readings_of

@@ -14,8 +14,8 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from discsim.validation.diagnosis.selection.to_stated import to_baseline
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.candidates.to_stated import to_baseline
 from discsim.validation.identification.gauss_newton import Fit, linearised_in, mapped
 from discsim.validation.identification.noise import NoiseModel
 from discsim.validation.identification.normal_equations import inverse_of, reduce

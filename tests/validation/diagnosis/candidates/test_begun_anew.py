@@ -17,10 +17,10 @@ from discsim.environment import Environment
 from discsim.recording import Plant, Recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
+from discsim.validation.diagnosis.candidates.begun_anew import begun_anew
 from discsim.validation.diagnosis.first_trajectory import begun_again_in_true_time, first_trajectory
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
-from discsim.validation.diagnosis.selection.begun_anew import begun_anew
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit, refit
 from discsim.validation.identification.parameters import Parameter

@@ -10,10 +10,10 @@ from discsim.recording import Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
+from discsim.validation.diagnosis.candidates.candidate import candidates_for
+from discsim.validation.diagnosis.candidates.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
 from discsim.validation.diagnosis.relaxed_fit import relaxed
-from discsim.validation.diagnosis.selection.candidates import candidates_for
-from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.identification.noise import estimate_noise, stated_noise
 
 

@@ -8,10 +8,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from discsim.validation.diagnosis.selection.candidates import free_candidate
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.score_tests import ScoreTest, screened_candidates
-from discsim.validation.diagnosis.selection.screening import NormalEquations
+from discsim.validation.diagnosis.candidates.candidate import free_candidate
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis
+from discsim.validation.diagnosis.candidates.score_tests import ScoreTest, screened_candidates
+from discsim.validation.diagnosis.candidates.screening import NormalEquations
 
 
 class Promised:

@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.validation.diagnosis.candidates.evidence import BOUNDS
 from discsim.validation.diagnosis.first_trajectory import begun_again_in_true_time, first_trajectory, time_ratio
-from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit
 from discsim.validation.identification.linear import Linear

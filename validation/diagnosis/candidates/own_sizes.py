@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2
 
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
 from discsim.validation.identification.gauss_newton import Fit, reduced_each
 from discsim.validation.identification.normal_equations import common_step
 

@@ -13,11 +13,11 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.sensors import CrossAxis, Lag
+from discsim.validation.diagnosis.candidates.begun_anew import begun_anew
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.candidates.evidence import BOUNDS, charge
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.diagnosis.first_trajectory import beginning, time_ratio
-from discsim.validation.diagnosis.selection.begun_anew import begun_anew
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from discsim.validation.diagnosis.selection.evidence import BOUNDS, charge
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, merit_of, penalty_of, refit
 from discsim.validation.identification.noise import (

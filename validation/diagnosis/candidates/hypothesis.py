@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, parameters_of
 from discsim.validation.identification.parameters import Parameter
 
 __all__ = ["Hypothesis", "Start"]

@@ -12,8 +12,8 @@ from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
 from discsim.sensors.sampling import Noise
 from discsim.validation.diagnosis.setup import SetupFault, with_fault
-from discsim.validation.diagnosis.setup.relations import Columns, misfits
-from discsim.validation.diagnosis.setup.spin_signals import spin_signals
+from discsim.validation.diagnosis.signals.relations import Columns, misfits
+from discsim.validation.diagnosis.signals.spin_signals import spin_signals
 
 
 def test_a_ramp_that_noise_hides_costs_what_chance_makes_of_it():

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
-from discsim.validation.diagnosis.setup.spin_signals import STEP, STILL, Locked, SpinSignals
+from discsim.validation.diagnosis.signals.spin_signals import STEP, STILL, Locked, SpinSignals
 from discsim.validation.identification.ordinary_errors import ordinary_sigma
 from discsim.validation.identification.plants import plant_of
 

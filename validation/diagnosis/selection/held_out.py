@@ -11,12 +11,12 @@ from typing import TypeAlias
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, left_out
-from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect
+from discsim.validation.diagnosis.candidates.continuous_fit import ContinuousFit, left_out
+from discsim.validation.diagnosis.candidates.evidence import price
+from discsim.validation.diagnosis.candidates.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.candidates.screening import free_columns
 from discsim.validation.diagnosis.selection.exchange import takes_its_place
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from discsim.validation.diagnosis.selection.screening import free_columns
 from discsim.validation.diagnosis.selection.search_state import Search, possible
 from discsim.validation.identification.gauss_newton import reduced_each
 from discsim.validation.identification.noise import chi_squared, log_likelihood

@@ -14,7 +14,7 @@ from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.mount_rows import ROWS as MOUNTS
 from discsim.effects.sensors import CrossAxis
 from discsim.effects.setup import TimeOffset
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.candidates.candidate import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.settings import SELECTION
 
 __all__ = ["charge", "holds_itself", "lead", "price", "price_of_oddity"]

@@ -24,8 +24,8 @@ from discsim.validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence
 from discsim.validation.diagnosis.consistency.imu_clock import ImuClock as FoundImuClock
 from discsim.validation.diagnosis.consistency.late_rows import LateRows as FoundLateRows
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
-from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of, slow_columns
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
+from discsim.validation.diagnosis.signals.phase_regression import angle_turned, signal_of, slow_columns
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import NoiseModel
 from discsim.validation.identification.parameters import Parameter
