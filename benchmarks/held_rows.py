@@ -19,7 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from discsim.arrays import FloatArray
-from discsim.validation.importing.held import find_held
+from discsim.validation.rows.held import find_held
 
 
 def motion(t: FloatArray, rest: float, rng: np.random.Generator) -> FloatArray:

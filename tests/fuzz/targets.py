@@ -28,11 +28,11 @@ from discsim.trajectory import predict
 from discsim.validation.checking import check_recording
 from discsim.validation.diagnosis.design.plans import read_plans
 from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.estimating.method_disagreement import disagreements
 from discsim.validation.estimating.spin_estimates import all_notes, estimate_all, estimate_json, rate_csv
 from discsim.validation.importing import import_recording, read_map, read_readings
 from discsim.validation.importing.sniffing import map_text, opened, sniff, stretches
 from discsim.validation.reporting.run import json_text
-from discsim.validation.scenarios.method_disagreement import disagreements
 from discsim.validation.scenarios.rate_table import plateau_table, rate_table_checks, run_rate_table
 from discsim.validation.sweeps.plan import read_plan
 

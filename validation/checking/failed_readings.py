@@ -14,7 +14,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.effects.setup import UNITS, AccelerometerUnit, GyroscopeUnit, MagnetometerUnit
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding
-from discsim.validation.importing.failed import failed_on_one_axis, failed_rows, on_all_axes
+from discsim.validation.rows.failed import failed_on_one_axis, failed_rows, on_all_axes
 
 __all__ = ["failed_findings", "without_failed"]
 

@@ -13,8 +13,8 @@ from discsim.recording import Recording
 from discsim.validation.checking.finding import Finding
 from discsim.validation.checking.path_points import out_of_reach, rows_in_words, standing
 from discsim.validation.checking.statements import FASTEST
-from discsim.validation.importing.held import find_held
 from discsim.validation.importing.import_map import SPEEDS
+from discsim.validation.rows.held import find_held
 
 __all__ = ["FARTHEST", "elsewhere", "gps_findings"]
 

@@ -12,10 +12,10 @@ from discsim.glitches import glitches
 from discsim.recording import SENSORS, Recording
 from discsim.validation.checking.finding import Finding
 from discsim.validation.checking.noise import noise_of
-from discsim.validation.importing.cleaning import CONSTANT, frozen_runs
-from discsim.validation.importing.held import find_held, step_of
-from discsim.validation.importing.readings import Readings
-from discsim.validation.importing.timing import row_timing
+from discsim.validation.rows.cleaning import CONSTANT, frozen_runs
+from discsim.validation.rows.held import find_held, step_of
+from discsim.validation.rows.readings import Readings
+from discsim.validation.rows.timing import row_timing
 
 __all__ = ["SensorCheck", "check_sensor", "clipped", "sensor_findings"]
 

@@ -13,9 +13,9 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.kind import BOARD
 from discsim.recording import Recording, Samples
-from discsim.validation.importing.even_rows import even_times, left_beside_stamps
-from discsim.validation.importing.own_times import LESS
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.even_rows import even_times, left_beside_stamps
+from discsim.validation.rows.own_times import LESS
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["with_even_rows"]
 

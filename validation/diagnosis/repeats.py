@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.recording import Recording, Samples
-from discsim.validation.importing import cleaning
-from discsim.validation.importing.held import find_held, with_holes_filled
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows import cleaning
+from discsim.validation.rows.held import find_held, with_holes_filled
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["fresh", "without_held_readings"]
 

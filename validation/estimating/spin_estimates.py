@@ -27,12 +27,12 @@ from discsim.validation.diagnosis.late_stamps import with_even_rows
 from discsim.validation.diagnosis.repeats import without_held_readings
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.reference import ReferenceDoubt, believed, reference_doubts
+from discsim.validation.estimating.method_disagreement import Disagreement, disagreements
 from discsim.validation.estimating.page import write_estimate_page
 from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from discsim.validation.reporting.run import json_text
 from discsim.validation.running.given import Given, given_recordings
 from discsim.validation.running.progress import Progress, silent
-from discsim.validation.scenarios.method_disagreement import Disagreement, disagreements
 
 __all__ = [
     "SpinEstimates",

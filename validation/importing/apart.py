@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["apart", "zones"]
 

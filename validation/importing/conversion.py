@@ -20,18 +20,18 @@ from discsim.glitches import FASTEST_SPIN
 from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.apart import apart
-from discsim.validation.importing.cleaning import cleaned, without_glitches
-from discsim.validation.importing.even_rows import at_even_times
-from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, on_all_axes
 from discsim.validation.importing.fixes_once import fixes_once
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.overflow import without_overflow
 from discsim.validation.importing.raw_table import Layout, RawTable, Repair, RepairList, read_raw
-from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.row_clock import RowClock, row_clock
 from discsim.validation.importing.sensor_rows import chosen_rows, hollow_rows, sensor_rows
-from discsim.validation.importing.timing import row_timing
 from discsim.validation.importing.wild import without_wild
+from discsim.validation.rows.cleaning import cleaned, without_glitches
+from discsim.validation.rows.even_rows import at_even_times
+from discsim.validation.rows.failed import dead_axis, failed_at_once, failed_on_one_axis, on_all_axes
+from discsim.validation.rows.readings import Readings
+from discsim.validation.rows.timing import row_timing
 
 __all__ = [
     "Imported",

@@ -6,7 +6,7 @@ import numpy as np
 
 from discsim.validation.importing.import_map import ImportMap
 from discsim.validation.importing.raw_table import RawTable, RepairList
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["fixes_once"]
 

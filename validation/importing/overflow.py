@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray, IntArray, runs
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["Continued", "continued", "without_overflow"]
 

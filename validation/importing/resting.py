@@ -11,7 +11,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.environment import Environment
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["dip_at_rest", "rest_notes"]
 

@@ -13,13 +13,13 @@ from discsim.errors import InputError
 from discsim.limits import LARGEST_READING
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
-from discsim.validation.importing.held import come_evenly
 from discsim.validation.importing.import_map import ImportMap, SensorMap
 from discsim.validation.importing.logs.tables import positions
 from discsim.validation.importing.raw_table import RawTable, RepairList
-from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.row_clock import RowClock
 from discsim.validation.importing.unsigned import signed
+from discsim.validation.rows.held import come_evenly
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["chosen_rows", "hollow_rows", "sensor_rows"]
 

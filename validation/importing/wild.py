@@ -8,7 +8,7 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.validation.importing.raw_table import RawTable, RepairList
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["wild_rows", "without_wild"]
 

@@ -14,8 +14,8 @@ from discsim.errors import InputError
 from discsim.estimators import YawRate
 from discsim.recording import Recording, Samples, SensorSheet, read_recording, write_recording
 from discsim.validation.commands.estimate import command
+from discsim.validation.estimating.method_disagreement import compare
 from discsim.validation.estimating.spin_estimates import estimate_spin
-from discsim.validation.scenarios.method_disagreement import compare
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ from discsim.errors import InputError
 from discsim.validation.importing import Imported, find_map, import_recording, parse_rows, read_map
 from discsim.validation.importing.cell_texts import number
 from discsim.validation.importing.clock import mended
-from discsim.validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
 from discsim.validation.importing.stamps import iso_seconds
-from discsim.validation.importing.timing import row_timing
+from discsim.validation.rows.held import find_held, find_interpolated, fresh_rows, step_of
+from discsim.validation.rows.timing import row_timing
 
 
 def spinning(t: np.ndarray, rate_deg_s: float = 2000.0) -> np.ndarray:

@@ -13,7 +13,7 @@ from support.made_logs import LANDING, RELEASE, made_log
 from discsim.errors import InputError
 from discsim.validation.importing.apart import apart
 from discsim.validation.importing.imported_log import import_log
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.readings import Readings
 
 LOG = made_log()
 START = datetime(2026, 5, 3, 12, 3, 20)

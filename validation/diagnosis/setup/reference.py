@@ -41,7 +41,7 @@ _LAGS, _ALIKE = 10.0, 0.03
 #: gravity that tells which way up a board is, m/s^2
 _UPRIGHT = 5.0
 #: a table stands that turns slower than this, rad/s: above any gyroscope's bias, as where a log is imported
-#: (`MOVES` of discsim.validation.importing.cleaning)
+#: (`MOVES` of discsim.validation.rows.cleaning)
 _TURNS = 0.5
 #: sensors that show a rate in each reading, by themselves
 _BY_THEMSELVES = ("gyroscope", "rate_reference")

@@ -14,13 +14,13 @@ from discsim.recording import SENSORS
 from discsim.validation.importing.apart import apart, zones
 from discsim.validation.importing.import_map import SPEEDS, UNITS
 from discsim.validation.importing.raw_table import Layout
-from discsim.validation.importing.readings import Readings
 from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Numbers
 from discsim.validation.importing.sniffing.names import last_word, read_name, sensor_of, words_of
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 from discsim.validation.importing.stamps import DATED, DAY, EPOCH
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["ProposedFixes", "fixes_of"]
 

@@ -14,7 +14,6 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
-from discsim.validation.importing.failed import failed_on_one_axis, failed_rows
 from discsim.validation.importing.overflow import continued
 from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
@@ -35,6 +34,7 @@ from discsim.validation.importing.sniffing.names import (
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 from discsim.validation.importing.unsigned import signed
 from discsim.validation.importing.wild import wild_rows
+from discsim.validation.rows.failed import failed_on_one_axis, failed_rows
 
 __all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, LANDING, RATE, RELEASE, made_log, three, write_table
 from support.thinned import one_in
 
-from discsim.validation.importing.cleaning import cleaned
-from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, failed_rows
 from discsim.validation.importing.imported_log import import_log
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.cleaning import cleaned
+from discsim.validation.rows.failed import dead_axis, failed_at_once, failed_on_one_axis, failed_rows
+from discsim.validation.rows.readings import Readings
 
 LOG = made_log()
 ROWS = np.arange(LOG.t.size)

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from discsim.arrays import BoolArray, FloatArray, runs
-from discsim.validation.importing.cleaning import FROZEN_ROWS, FROZEN_TIMES
-from discsim.validation.importing.held import step_of
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.cleaning import FROZEN_ROWS, FROZEN_TIMES
+from discsim.validation.rows.held import step_of
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["dead_axis", "failed_at_once", "failed_on_one_axis", "failed_rows", "on_all_axes"]
 
@@ -55,7 +55,7 @@ def failed_rows(sensor: str | None, value: FloatArray) -> BoolArray:
     """Tell which rows (n,) of a sensor's readings as written (n, 3) failed, by its readings alone.
 
     Of an accelerometer or a gyroscope (or a sensor that is not known) runs of fewer than `FROZEN_ROWS` zeros are told:
-    what stands for longer is told by the others (`discsim.validation.importing.cleaning.frozen_runs`).
+    what stands for longer is told by the others (`discsim.validation.rows.cleaning.frozen_runs`).
     """
     failed, common = np.zeros(len(value), dtype=np.bool_), on_all_axes(value)
     if not np.isfinite(common).any():

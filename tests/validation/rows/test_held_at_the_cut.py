@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from discsim.validation.importing.own_times import own_times
+from discsim.validation.rows.own_times import own_times
 
 #: s between rows; the two clocks run apart by two rows in a throw
 ROW = 0.002

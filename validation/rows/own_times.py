@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray, IntArray
-from discsim.validation.importing.held import come_evenly
-from discsim.validation.importing.readings import Readings
-from discsim.validation.importing.timing import row_timing
+from discsim.validation.rows.held import come_evenly
+from discsim.validation.rows.readings import Readings
+from discsim.validation.rows.timing import row_timing
 
 __all__ = ["LESS", "STRETCH", "OwnTimes", "between_rows", "in_step", "left_by_turning", "own_times"]
 

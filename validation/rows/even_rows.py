@@ -12,9 +12,9 @@ from collections.abc import Hashable, Mapping
 import numpy as np
 
 from discsim.arrays import FloatArray, IntArray, sd_by_median
-from discsim.validation.importing.held import find_held, fresh_rows
-from discsim.validation.importing.own_times import LESS, STRETCH, left_by_turning
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.held import find_held, fresh_rows
+from discsim.validation.rows.own_times import LESS, STRETCH, left_by_turning
+from discsim.validation.rows.readings import Readings
 
 __all__ = ["at_even_times", "even_times", "left_beside_stamps"]
 

@@ -9,8 +9,8 @@ import discsim
 from discsim.arrays import FloatArray
 from discsim.estimators.methods import estimate
 from discsim.validation.diagnosis.late_stamps import with_even_rows
-from discsim.validation.importing.even_rows import at_even_times, even_times
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.even_rows import at_even_times, even_times
+from discsim.validation.rows.readings import Readings
 
 ROWS, STEP, RATE = 600, 0.005, np.radians(3900.0)
 TRUE = 2.0 + STEP * np.arange(ROWS)

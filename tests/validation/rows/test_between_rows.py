@@ -5,8 +5,8 @@ import pytest
 from support.made_logs import made_log, three, write_table
 
 from discsim.validation.importing.imported_log import import_log
-from discsim.validation.importing.own_times import between_rows
-from discsim.validation.importing.readings import Readings
+from discsim.validation.rows.own_times import between_rows
+from discsim.validation.rows.readings import Readings
 
 ROW = 0.01  # s
 

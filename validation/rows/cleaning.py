@@ -12,7 +12,7 @@ import numpy as np
 
 from discsim.arrays import IntArray
 from discsim.glitches import FASTEST_SPIN, glitches
-from discsim.validation.importing.held import (
+from discsim.validation.rows.held import (
     Held,
     find_held,
     find_interpolated,
@@ -20,9 +20,9 @@ from discsim.validation.importing.held import (
     step_of,
     with_holes_filled,
 )
-from discsim.validation.importing.own_times import between_rows, in_step, own_times
-from discsim.validation.importing.readings import Readings
-from discsim.validation.importing.timing import row_timing
+from discsim.validation.rows.own_times import between_rows, in_step, own_times
+from discsim.validation.rows.readings import Readings
+from discsim.validation.rows.timing import row_timing
 
 __all__ = ["Cleaned", "body_moves", "cleaned", "frozen_runs", "without_glitches", "without_repeats"]
 
