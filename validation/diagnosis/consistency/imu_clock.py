@@ -22,7 +22,7 @@ from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.compiled import compiled
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.consistency.late_rows import (
-    LateRows,
+    FoundLateRows,
     Windows,
     asked_within,
     even_loop,
@@ -30,7 +30,7 @@ from discsim.validation.diagnosis.consistency.late_rows import (
     loops_with_late_rows,
     rows_decided,
 )
-from discsim.validation.diagnosis.consistency.own_clock import OwnClock, SamplesShown
+from discsim.validation.diagnosis.consistency.own_clock import FoundOwnClock, SamplesShown
 from discsim.validation.diagnosis.signals.phase_regression import (
     retimed,
     signal_of,
@@ -39,7 +39,7 @@ from discsim.validation.diagnosis.signals.phase_regression import (
     slow_sum,
 )
 
-__all__ = ["ImuClock", "ImuRows", "imu_clock_of"]
+__all__ = ["FoundImuClock", "ImuRows", "imu_clock_of"]
 
 #: knots of the wobble's amplitude, s, a little closer than where the field's samples are counted (it halves in 0.3 s or
 #: more), and of what stands still in the body or in the air
@@ -99,7 +99,7 @@ class ImuRows:
 
 
 @dataclass(frozen=True)
-class ImuClock:
+class FoundImuClock:
     """The own period of the chip of gyroscope and accelerometer, s, with its error, and the rows of each recording.
 
     ``loops`` tells that the chip is read in step with the logger's loop: its comb is the loop's, no clock of its own.
@@ -110,7 +110,7 @@ class ImuClock:
     sd_s: float
     shown: tuple[ImuRows, ...]
     loops: bool
-    late: LateRows | None = None
+    late: FoundLateRows | None = None
 
     @property
     def gain(self) -> float:
@@ -368,7 +368,7 @@ def _from_all_phases(wobble: _Wobble, first: _Fitted, periods: FloatArray) -> _C
     return max(best, _followed(wobble, first, periods, _ROUNDS, best.times), key=lambda one: one.gain)
 
 
-def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: OwnClock) -> ImuClock | None:
+def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: FoundOwnClock) -> FoundImuClock | None:
     """Return the own clock of gyroscope and accelerometer, None where the times of the field's samples do as well.
 
     Takes recordings, what to call them, and the magnetometer's samples that their rows show. Each recording must gain
@@ -386,7 +386,7 @@ def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: O
     return found if not clock.none_lost else _with_late_rows(wobbles, clock, found)
 
 
-def _own_comb(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | None:
+def _own_comb(wobbles: Mapping[str, _Wobble], clock: FoundOwnClock) -> FoundImuClock | None:
     """Return the clock whose samples the wobbles show, None where the times of the field's samples do as well."""
     row = float(np.median([np.median(np.diff(wobble.written)) for wobble in wobbles.values()]))
     longest = max(float(wobble.asked[-1]) for wobble in wobbles.values())
@@ -517,7 +517,9 @@ def _at_period(wobble: _Wobble, first: _Fitted, comb: _Comb, period: float) -> _
     return _followed(wobble, first, np.array([period]), _ROUNDS, times)
 
 
-def _with_late_rows(wobbles: Mapping[str, _Wobble], clock: OwnClock, comb: ImuClock | None) -> ImuClock | None:
+def _with_late_rows(
+    wobbles: Mapping[str, _Wobble], clock: FoundOwnClock, comb: FoundImuClock | None
+) -> FoundImuClock | None:
     """Return the chip's clock beside a loop some of whose rows are late, or that loop itself where it tells more.
 
     None where neither does as well as the times of the field's samples.
@@ -533,7 +535,7 @@ def _windows(wobble: _Wobble) -> Windows:
     return Windows(step, wobble.asked, wobble.within)
 
 
-def _looped(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | None:
+def _looped(wobbles: Mapping[str, _Wobble], clock: FoundOwnClock) -> FoundImuClock | None:
     """Return the rows of a chip that is read when the loop asks for them, on time or late; None without such a loop."""
     windows = {name: _windows(wobble) for name, wobble in wobbles.items()}
     begun = asked_within(windows)
@@ -574,7 +576,7 @@ def _late_by_phase(wobble: _Wobble, due: FloatArray, tick: float) -> tuple[BoolA
     return late, tick
 
 
-def _beside_a_late_loop(wobbles: Mapping[str, _Wobble], comb: ImuClock) -> ImuClock:
+def _beside_a_late_loop(wobbles: Mapping[str, _Wobble], comb: FoundImuClock) -> FoundImuClock:
     """Return the clock of a chip's own with what the windows of the field's samples say of the loop's late rows."""
     field = {name: _windows(wobble) for name, wobble in wobbles.items()}
     loops = loops_with_late_rows(field)
@@ -588,8 +590,8 @@ def _beside_a_late_loop(wobbles: Mapping[str, _Wobble], comb: ImuClock) -> ImuCl
     return _clock_of(shown, False, loops.told_by(field, chip))
 
 
-def _clock_of(shown: Sequence[ImuRows], loops: bool, late: LateRows | None = None) -> ImuClock:
+def _clock_of(shown: Sequence[ImuRows], loops: bool, late: FoundLateRows | None = None) -> FoundImuClock:
     """Return the clock that the rows of recordings tell, its error by how much their own periods scatter."""
     own = np.array([one.period_s for one in shown])
     sd = float(np.std(own, ddof=1) / np.sqrt(own.size))
-    return ImuClock(float(np.mean(own)), sd, tuple(shown), loops, late)
+    return FoundImuClock(float(np.mean(own)), sd, tuple(shown), loops, late)

@@ -21,8 +21,8 @@ from discsim.arrays import BoolArray, FloatArray, sd_of_share
 
 __all__ = [
     "MISCOUNTED",
+    "FoundLateRows",
     "LateLoops",
-    "LateRows",
     "Loop",
     "Windows",
     "asked_within",
@@ -66,7 +66,7 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class LateRows:
+class FoundLateRows:
     """By how much rows came late, s, and which share of them, with errors.
 
     ``agreed`` is twice the log likelihood by which two sensors tell the same rows late, beyond chance.
@@ -145,7 +145,7 @@ class LateLoops:
     tick_sd_s: float
     due: Mapping[str, FloatArray]
 
-    def told_by(self, field: Mapping[str, Windows], chip: Mapping[str, Windows]) -> LateRows:
+    def told_by(self, field: Mapping[str, Windows], chip: Mapping[str, Windows]) -> FoundLateRows:
         """Return what the windows of the field's samples say of late rows, and how surely those of a chip say so, too.
 
         Of a short tick few rows are decided by both. That they do not contradict one another, and each by itself asks
@@ -157,7 +157,7 @@ class LateLoops:
         agreed = _agreed(told)
         if agreed > 0.0:
             agreed = max(agreed, min(self._gain(one) for one in (field, chip)))
-        return LateRows(self.tick_s, self.tick_sd_s, share, error, agreed)
+        return FoundLateRows(self.tick_s, self.tick_sd_s, share, error, agreed)
 
     def _decided(self, name: str, own: Windows) -> Decided:
         return rows_decided(self.due[name], self.tick_s, own.made, own.period_s)
@@ -208,7 +208,7 @@ def rows_decided(due: FloatArray, tick: float, made: FloatArray, period: float) 
     return late & ~on_time, on_time & ~late
 
 
-def late_rows_of(ticks: FloatArray, told: Mapping[str, tuple[Decided, Decided]]) -> LateRows:
+def late_rows_of(ticks: FloatArray, told: Mapping[str, tuple[Decided, Decided]]) -> FoundLateRows:
     """Return what rows are late by, from each recording's own tick (k,) s, and which rows two sensors tell.
 
     ``told`` are each recording's rows that are late and on time, by the magnetometer and by another sensor, whose word
@@ -216,7 +216,7 @@ def late_rows_of(ticks: FloatArray, told: Mapping[str, tuple[Decided, Decided]])
     """
     share, error = _share([(b[0] | (a[0] & ~b[1]), b[1] | (a[1] & ~b[0])) for a, b in told.values()])
     spread = float(np.std(ticks, ddof=1) / np.sqrt(ticks.size)) if ticks.size > 1 else float("nan")
-    return LateRows(float(np.mean(ticks)), spread, share, error, _agreed(told.values()))
+    return FoundLateRows(float(np.mean(ticks)), spread, share, error, _agreed(told.values()))
 
 
 def _share(decided: Iterable[Decided]) -> tuple[float, float]:

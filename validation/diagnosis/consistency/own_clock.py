@@ -35,7 +35,7 @@ from discsim.validation.diagnosis.signals.phase_regression import (
 )
 from discsim.validation.identification.circle import circle_centre
 
-__all__ = ["MOST_ROWS", "OwnClock", "SamplesShown", "own_clock_of", "too_many"]
+__all__ = ["MOST_ROWS", "FoundOwnClock", "SamplesShown", "own_clock_of", "too_many"]
 
 #: most rows of a recording whose samples are counted: a count takes seconds for 1000, and grows with their square
 MOST_ROWS = 1200
@@ -133,7 +133,7 @@ class SamplesShown:
 
 
 @dataclass(frozen=True)
-class OwnClock:
+class FoundOwnClock:
     """A magnetometer's own period, s, with its error, and what each recording's rows show of its samples."""
 
     period_s: float
@@ -217,7 +217,7 @@ def too_many(rows: Rows) -> bool:
     return max((own.t.size for own in rows.durations), default=0) > MOST_ROWS
 
 
-def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Rows) -> OwnClock | None:
+def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Rows) -> FoundOwnClock | None:
     """Return the magnetometer's own clock, None where rows that are counted in whole ticks do as well.
 
     Takes recordings, what to call them and the ticks that they come in. Where many rows are means of samples that are
@@ -299,7 +299,7 @@ def _clock(
     means: bool,
     loops: Loops | None = None,
     kept: bool = False,
-) -> OwnClock | None:
+) -> FoundOwnClock | None:
     """Return the clock that counted samples tell, None where they are too close to be told apart.
 
     Takes what is left of each field, ``rest``, where rows last whole ticks. Rows show ``means`` of two samples, or
@@ -322,4 +322,4 @@ def _clock(
         shown.append(SamplesShown(name, period, found.newest, apart, left, step, kept, found.doubtful))
     mean = float(np.mean(list(periods.values())))
     scatter = float(np.std(list(periods.values()), ddof=1)) if len(periods) > 1 else rows.sd_s
-    return OwnClock(mean, scatter / np.sqrt(len(periods)), gain, tuple(shown), 0.5 if means else 0.0)
+    return FoundOwnClock(mean, scatter / np.sqrt(len(periods)), gain, tuple(shown), 0.5 if means else 0.0)

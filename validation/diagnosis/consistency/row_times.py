@@ -21,9 +21,9 @@ from discsim.effects.timing_rows import Average, ImuClock, LateRows, LostRows, O
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.answer.measured import Located
 from discsim.validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
-from discsim.validation.diagnosis.consistency.imu_clock import ImuClock as FoundImuClock
-from discsim.validation.diagnosis.consistency.late_rows import LateRows as FoundLateRows
-from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
+from discsim.validation.diagnosis.consistency.imu_clock import FoundImuClock
+from discsim.validation.diagnosis.consistency.late_rows import FoundLateRows
+from discsim.validation.diagnosis.consistency.own_clock import FoundOwnClock
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
 from discsim.validation.diagnosis.signals.phase_regression import angle_turned, signal_of, slow_columns
 from discsim.validation.identification.gauss_newton import Fit
@@ -65,7 +65,7 @@ class RowTimes:
     """What was counted of recordings (called ``names``), and what each gains by it."""
 
     names: tuple[str, ...]
-    clock: FoundClock
+    clock: FoundOwnClock
     proofs: tuple[RowProof, ...]
     imu: FoundImuClock | None = None
 

@@ -19,9 +19,9 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.imu_clock import ImuClock, imu_clock_of
+from discsim.validation.diagnosis.consistency.imu_clock import FoundImuClock, imu_clock_of
 from discsim.validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
-from discsim.validation.diagnosis.consistency.own_clock import MOST_ROWS, OwnClock, own_clock_of, too_many
+from discsim.validation.diagnosis.consistency.own_clock import MOST_ROWS, FoundOwnClock, own_clock_of, too_many
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows, rows_of
 from discsim.validation.diagnosis.signals.phase_regression import (
     REACH,
@@ -204,8 +204,8 @@ class Agreement:
     rows: Rows | None = None
     row_proofs: tuple[RowProof, ...] = ()
     settling: LowPassTransient | None = None
-    own_clock: OwnClock | None = None
-    imu_clock: ImuClock | None = None
+    own_clock: FoundOwnClock | None = None
+    imu_clock: FoundImuClock | None = None
 
     @property
     def contradiction(self) -> bool:
@@ -271,7 +271,7 @@ def agreement_of(
     return replace(found, causes=tuple(causes), row_proofs=_row_proofs(rows, some))
 
 
-def _in_true_time(recording: Recording, name: str, rows: Rows, own_clock: OwnClock | None) -> Recording:
+def _in_true_time(recording: Recording, name: str, rows: Rows, own_clock: FoundOwnClock | None) -> Recording:
     """Return a recording in the times that counted rows give, by the magnetometer's own clock where it has one."""
     counted = None if own_clock is None else own_clock.counted(recording, name)
     return counted or rows.counted(recording, name, rows.tick_s) or recording

@@ -15,9 +15,9 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from discsim.validation.diagnosis.signals.spin_signals import averages, usable
+from discsim.validation.diagnosis.signals.spin_signals import averages, mean_readings, usable
 
-__all__ = ["axis_by_pull"]
+__all__ = ["OFF_AXIS", "axis_by_pull", "pointing_out"]
 
 #: windows' spacing and width (one sigma), s, and what is left out at either end
 _SPACING, _WIDTH, _ENDS = 0.1, 0.1, 0.3
@@ -25,7 +25,7 @@ _SPACING, _WIDTH, _ENDS = 0.1, 0.1, 0.3
 #: in all
 _KNOWN = 0.9
 #: an accelerometer nearer to the axis than this, m, shows no pull
-_OFF_AXIS = 2e-3
+OFF_AXIS = 2e-3
 #: what never clips is a share of the spin, and no wobble, from this share of the limit on
 _LEAST = 0.1
 #: by how much, as a share, the square of the rate must change for the pull to be told from lift
@@ -42,7 +42,7 @@ def axis_by_pull(recordings: Sequence[Recording]) -> FloatArray | None:
     sheet = recordings[0].sheets.get("accelerometer")
     place = None if sheet is None else sheet.position
     windows = [found for recording in recordings if (found := _windows(recording)) is not None]
-    if place is None or np.hypot(*place[:2]) < _OFF_AXIS or not windows:
+    if place is None or np.hypot(*place[:2]) < OFF_AXIS or not windows:
         return None
     rate, force = (np.vstack(parts) for parts in zip(*windows, strict=True))
     known = np.isfinite(rate)
@@ -70,7 +70,12 @@ def axis_by_pull(recordings: Sequence[Recording]) -> FloatArray | None:
         u[clipped] = np.copysign(np.sqrt(rest), u[clipped])
     if abs(u[clipped]) * float(np.min(np.abs(rate[:, sure]))) < _KNOWN * limit:
         return None  # it would not clip
-    return np.asarray(u / np.linalg.norm(u) * np.sign(u[int(np.argmax(np.abs(u)))]))
+    return pointing_out(u / np.linalg.norm(u))
+
+
+def pointing_out(axis: FloatArray) -> FloatArray:
+    """Return the one of an axis (3,) and its opposite of which the larger part is positive."""
+    return np.asarray(axis * np.sign(axis[int(np.argmax(np.abs(axis)))]))
 
 
 def _windows(recording: Recording) -> tuple[FloatArray, FloatArray] | None:
@@ -87,6 +92,6 @@ def _windows(recording: Recording) -> tuple[FloatArray, FloatArray] | None:
         good = np.isfinite(w[:, k])
         if np.mean(good) > _KNOWN:
             rate[:, k] = np.real(averages(t[good], w[good, k], grid, _WIDTH))
-    force = np.column_stack([np.real(averages(t_felt, column, grid, _WIDTH)) for column in f.T])
+    force = mean_readings(t_felt, f, grid, _WIDTH)
     sound = np.all(np.isfinite(force), axis=1)
     return rate[sound], force[sound]

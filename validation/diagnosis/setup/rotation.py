@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from discsim.validation.diagnosis.setup.axis_by_pull import axis_by_pull
-from discsim.validation.diagnosis.signals.spin_signals import averages, turning_line, usable
+from discsim.validation.diagnosis.setup.axis_by_pull import OFF_AXIS, axis_by_pull, pointing_out
+from discsim.validation.diagnosis.signals.spin_signals import mean_readings, turning_line, usable
 
 __all__ = ["board_turns", "spin_axis"]
 
@@ -32,8 +32,7 @@ def spin_axis(recordings: Sequence[Recording], sensor: str) -> FloatArray | None
             total += np.outer(axis, axis)
     if not np.any(total):
         return None
-    own = np.linalg.eigh(total)[1][:, 2]
-    return np.asarray(own * np.sign(own[int(np.argmax(np.abs(own)))]))
+    return pointing_out(np.linalg.eigh(total)[1][:, 2])
 
 
 def _pull(recordings: Sequence[Recording], axis: FloatArray) -> FloatArray | None:
@@ -47,7 +46,7 @@ def _pull(recordings: Sequence[Recording], axis: FloatArray) -> FloatArray | Non
         grid = np.arange(t[0] + 0.3, t[-1] - 0.3, 0.1)
         if grid.size == 0:
             continue
-        mean = np.column_stack([np.real(averages(t, column, grid, 0.2)) for column in f.T])
+        mean = mean_readings(t, f, grid, 0.2)
         across = mean - np.outer(mean @ axis, axis)
         total += np.nansum(across[np.all(np.isfinite(mean), axis=1)], axis=0)
     return total if float(np.linalg.norm(total)) > 0.0 else None
@@ -72,7 +71,7 @@ def board_turns(recordings: Sequence[Recording]) -> list[FloatArray]:
     found = []
     for sign in (1.0, -1.0):
         z = sign * axis
-        if pull is None or place is None or np.hypot(place[0], place[1]) < 2e-3:
+        if pull is None or place is None or np.hypot(place[0], place[1]) < OFF_AXIS:
             found.append(_least(z))
             continue
         x = pull / np.linalg.norm(pull)

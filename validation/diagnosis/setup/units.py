@@ -1,8 +1,8 @@
 """Units that are not those of the columns: a magnitude off by a factor that some unit has, and by nothing near one.
 
 Field strengths, gravity, the pull towards the axis and the rate at which the field turns are known to some tens of
-per cent before anything is fitted; units lie at least a factor of nine apart. So each magnitude names its unit, or
-none: where it is near one, or near no unit's factor, nothing is said.
+per cent before anything is fitted; a wrong unit is off by a factor of nine at least. So each magnitude names its unit,
+or none: where it is near one, or near no unit's factor, nothing is said.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from discsim.validation.identification.initial.path import Fixes, local_cubics, 
 from discsim.validation.identification.initial.spin_phase import field_spin
 from discsim.validation.identification.plants import plant_of
 
-__all__ = ["FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_line", "usable"]
+__all__ = ["FlightPath", "Locked", "SpinSignals", "averages", "mean_readings", "spin_signals", "turning_line", "usable"]
 
 
 #: spacing of the grid, and the one sigma of the averaging, s: a turn or more at 50 rad/s, slow beside precession
@@ -155,6 +155,11 @@ def averages(t: FloatArray, value: ComplexArray | FloatArray, grid: FloatArray, 
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.convolve(total, kernel, "same")[at] / np.where(weight > 0.5, weight, np.nan)
     return np.asarray(mean)
+
+
+def mean_readings(t: FloatArray, value: FloatArray, grid: FloatArray, sigma: float) -> FloatArray:
+    """Return Gaussian averages of readings (n, 3) at the instants of an even grid (m, 3); NaN where there are none."""
+    return np.column_stack([np.real(averages(t, column, grid, sigma)) for column in value.T])
 
 
 def spin_signals(recording: Recording) -> SpinSignals | None:

@@ -8,14 +8,14 @@ from support import logger_loop as loop
 
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.imu_clock import imu_clock_of
-from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
+from discsim.validation.diagnosis.consistency.own_clock import FoundOwnClock, own_clock_of
 from discsim.validation.diagnosis.consistency.row_times import RowTimes
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
 
 NAMES = loop.NAMES
 
 
-def counted(seed: int, chip: float | None) -> tuple[list[Recording], OwnClock]:
+def counted(seed: int, chip: float | None) -> tuple[list[Recording], FoundOwnClock]:
     made = [
         loop.logged(motion, seed + k, own_clock=True, weight=0.5, chip=chip)[0]
         for k, motion in enumerate(loop.motions())

@@ -9,11 +9,17 @@ import pytest
 from support.logger_loop import LOOP, NAMES, PERIOD, logged, motions
 
 from discsim.validation.diagnosis.consistency.counted_samples import field_of, followed, unslipped
-from discsim.validation.diagnosis.consistency.own_clock import MOST_ROWS, OwnClock, SamplesShown, own_clock_of, too_many
+from discsim.validation.diagnosis.consistency.own_clock import (
+    MOST_ROWS,
+    FoundOwnClock,
+    SamplesShown,
+    own_clock_of,
+    too_many,
+)
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
 
 
-def found(seed: int, *, own_clock: bool, weight: float) -> tuple[OwnClock | None, list[np.ndarray]]:
+def found(seed: int, *, own_clock: bool, weight: float) -> tuple[FoundOwnClock | None, list[np.ndarray]]:
     made = [logged(motion, seed + k, own_clock=own_clock, weight=weight) for k, motion in enumerate(motions())]
     recordings = [recording for recording, _ in made]
     rows = rows_of(recordings, NAMES)

@@ -11,7 +11,7 @@ from support import logger_loop as loop
 
 from discsim.effects import effect
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.imu_clock import ImuClock
+from discsim.validation.diagnosis.consistency.imu_clock import FoundImuClock
 from discsim.validation.diagnosis.consistency.row_times import RowTimes, row_times
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.identification.gauss_newton import Fit
@@ -106,7 +106,7 @@ def test_a_fit_may_scale_all_times_and_what_was_counted_follows_it():
 
 def test_the_fields_clock_beside_a_chips_own_is_free_and_both_periods_follow_it():
     """Whole numbers hold one comb to the other: 0.015 % of that bent a motion by more than all that was concealed."""
-    chip = ImuClock(0.0091, 1e-6, (), False)
+    chip = FoundImuClock(0.0091, 1e-6, (), False)
     found = replace(counted(), imu=chip)
     scale, beside, offset, *placed = found.free
     assert (scale.key, beside.key) == (("clock.rate", "ratio"), ("mag.clock_rate", "ratio"))
