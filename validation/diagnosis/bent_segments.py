@@ -50,15 +50,22 @@ def _middles(nodes: FloatArray, some: BoolArray | bool = True) -> FloatArray:
 
 
 def _gains(final: Fit, fine: Fit, recording: int) -> FloatArray:
-    """Return what the readings of each segment (k,) gain in chi-squared; means over turns belong to none."""
+    """Return what the readings of each segment (k,) gain in chi-squared; means over turns belong to none.
+
+    Each fit leaves out what its own lag has not forgotten, and what its own motion says is clipped: readings that one
+    of them lacks gain nothing.
+    """
     before, after = final.linears[recording], fine.linears[recording]
+    others = {(channel.sensor, channel.axis): channel for channel in after.channels}
     nodes = final.trajectories[recording].nodes
     gains = np.zeros(nodes.size - 1)
     for channel in before.channels:
-        if channel.worth > 1.0:
+        other = others.get((channel.sensor, channel.axis))
+        if channel.worth > 1.0 or other is None:
             continue
-        rows = channel.rows
-        squares = (before.residual[rows] ** 2 - after.residual[rows] ** 2) / final.noise[channel.group].sd ** 2
-        segment = np.clip(np.searchsorted(nodes, before.t[rows], side="right") - 1, 0, gains.size - 1)
+        _, own, same = np.intersect1d(channel.index, other.index, return_indices=True)
+        left = before.residual[channel.rows][own], after.residual[other.rows][same]
+        squares = (left[0] ** 2 - left[1] ** 2) / final.noise[channel.group].sd ** 2
+        segment = np.clip(np.searchsorted(nodes, before.t[channel.rows][own], side="right") - 1, 0, gains.size - 1)
         np.add.at(gains, segment, squares)
     return gains

@@ -8,6 +8,8 @@ import numpy as np
 from support.made import MODULE, throws
 
 from discsim.disc import Release
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import Lag
 from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
@@ -16,6 +18,7 @@ from discsim.validation.diagnosis.bent_segments import with_bends_followed
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.starting_point import screened
+from discsim.validation.identification.gauss_newton import refit
 from discsim.validation.identification.plants.free_spin import FREE_SPIN
 
 BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)
@@ -46,6 +49,21 @@ def test_a_segment_with_a_corner_is_halved_and_its_fit_is_the_better_for_it():
     np.testing.assert_allclose(new, [0.5 * (before[k - 1] + before[k]) for k in np.searchsorted(before, new)])
     again = screened(SearchProblem(recordings, followed=fit))
     assert again.base.score < found.base.score - 20.0 * new.size
+
+
+def test_readings_that_another_lag_has_not_forgotten_gain_no_segment_anything():
+    recordings = [spinning("dd2", 1.8)]
+    followed = relaxed(recordings)
+    found = screened(SearchProblem(recordings, followed=followed))
+    usual = with_bends_followed(found, followed)
+    slow = catalogued(Lag, "magnetometer").id, "tau_s"
+    fit = replace(found.final.fit, fixed={**found.final.fit.fixed, slow: 1e-4})
+    fewer = refit(fit, iterations=1).linears[0].t.size
+    assert fewer < found.final.fit.linears[0].t.size
+    moved = with_bends_followed(replace(found, final=replace(found.final, fit=fit)), followed)
+    assert usual is not None
+    assert moved is not None
+    np.testing.assert_array_equal(moved.trajectories[0].nodes, usual.trajectories[0].nodes)
 
 
 def test_where_no_moment_bends_no_segment_is_halved():
