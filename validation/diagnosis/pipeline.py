@@ -26,6 +26,7 @@ from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
+from discsim.validation.diagnosis.selection.one_board import with_one_board
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.refitted_out_of_balance import refitted_out_of_balance
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
@@ -191,7 +192,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     if law_of_all.found is not None:
         return Tried(ready, None, found.at_base(), law_of_all.found)
     if ready.rows is not None:  # no bent segments there: defects of continuity are wide, and the pure error is known
-        found = with_iron_weighed(refitted_out_of_balance(found))
+        found = with_iron_weighed(with_one_board(refitted_out_of_balance(found)))
     elif followed.plant.weakly_identified:
         found = _with_bends(found, followed, problem)
     return Tried(ready, None, found)
