@@ -114,7 +114,8 @@ def code_digest() -> str:
     here = Path(__file__).parents[1]
     places = [here / "challenge" / name for name in _AFTERWARDS]
     afterwards = {file for place in places for file in (place.rglob("*.py") if place.is_dir() else [place])}
-    folders = (Path(discsim.__file__).parent, *(here / name for name in ("identification", "diagnosis", "challenge")))
+    rooms = ("rows", "identification", "diagnosis", "challenge")
+    folders = (Path(discsim.__file__).parent, *(here / name for name in rooms))
     files = (here / "scenarios" / "throws.py", here / "commands" / "diagnose.py")
     code = source_digest(*folders, *files, without=afterwards)
     read = [f"{folder}/{name}.toml" for folder in ("discs", "parts") for name in model_names(folder)]
