@@ -16,7 +16,7 @@ from discsim.effects.kind import EVERYWHERE, Row
 
 __all__ = ["ROWS", "Average", "ImuClock", "LateRows", "LostRows", "OwnClock", "held_since", "late_by", "written_rows"]
 
-#: who finds these: the count of the samples that rows show (`discsim.validation.diagnosis.consistency.row_times`)
+#: who finds these: the count of the samples that rows show (`discsim.validation.diagnosis.detectors.row_times`)
 _COUNTED = "row_times"
 
 

@@ -13,9 +13,9 @@ from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
 from discsim.validation.diagnosis.bent_segments import with_bends_followed
 from discsim.validation.diagnosis.candidates.candidate import stand_ins
-from discsim.validation.diagnosis.consistency.row_times import row_times
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of, compared
 from discsim.validation.diagnosis.datasets import recording_names, recordings_of
+from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.early_verdict import contradiction_after, contradiction_in
 from discsim.validation.diagnosis.inertia import with_inertia
 from discsim.validation.diagnosis.misstated import reconciling

@@ -10,8 +10,8 @@ from discsim.effects.sensors import Lag
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.answer.misstated import Misstated
-from discsim.validation.diagnosis.consistency.row_times import RowTimes
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, Comparison
+from discsim.validation.diagnosis.detectors.row_times import RowTimes
 from discsim.validation.diagnosis.early_verdict import Contradiction
 from discsim.validation.diagnosis.progress import Progress, silent
 from discsim.validation.diagnosis.result import Verdict

@@ -9,8 +9,8 @@ from support import logger_loop as loop
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.imu_clock import imu_clock_of
 from discsim.validation.diagnosis.consistency.own_clock import FoundOwnClock, own_clock_of
-from discsim.validation.diagnosis.consistency.row_times import RowTimes
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
+from discsim.validation.diagnosis.detectors.row_times import RowTimes
 
 NAMES = loop.NAMES
 

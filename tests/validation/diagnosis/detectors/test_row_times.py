@@ -12,8 +12,8 @@ from support import logger_loop as loop
 from discsim.effects import effect
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.imu_clock import FoundImuClock
-from discsim.validation.diagnosis.consistency.row_times import RowTimes, row_times
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
+from discsim.validation.diagnosis.detectors.row_times import RowTimes, row_times
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import GroupNoise
 from discsim.validation.identification.observations import readings_of
