@@ -18,10 +18,11 @@ from scipy.sparse.csgraph import connected_components
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURE = ROOT / "docs" / "architecture.md", ROOT / "docs" / "images" / "architecture.png"
 MARKS = "<!-- rooms: begin -->", "<!-- rooms: end -->"
-#: packages whose own folders are rooms of their own
 #: it names all that users call, from every room, and imports none of it before it is asked for
 DOOR = Path("discsim") / "__init__.py"
+#: packages whose own folders are rooms of their own, and those of which files beside them are, too
 OPENED = ("discsim", "validation", "validation.diagnosis")
+APART = ("validation.diagnosis",)
 
 
 def room_of(module: str, packages: set[str]) -> str:
@@ -36,7 +37,10 @@ def room_of(module: str, packages: set[str]) -> str:
 
 
 def rooms() -> tuple[dict[str, str], dict[str, set[str]]]:
-    """Return what each room says of itself, and the rooms that each imports."""
+    """Return what each room says of itself, and the rooms that each imports.
+
+    A file beside the rooms of an opened package that one of these imports lies below them: it is a room of its own.
+    """
     files = {
         path: path.relative_to(ROOT)
         for top in ("discsim", "estimators", "validation")
@@ -44,30 +48,39 @@ def rooms() -> tuple[dict[str, str], dict[str, set[str]]]:
     }
     packages = {".".join(path.parent.parts) for path in files.values() if path.name == "__init__.py"}
     known = {".".join(path.with_suffix("").parts) for path in files.values()} | packages
-    inner = tuple(f"discsim.{top}" for top in ("estimators", "validation"))  # rooms are called as folders are
     said: dict[str, str] = {}
-    edges: dict[str, set[str]] = defaultdict(set)
+    arrows: dict[str, set[str]] = {}
     for path, relative in files.items():
-        if relative == DOOR:
-            said["discsim"] = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n\n")[
-                0
-            ]
-            continue
         module = ".".join(relative.parent.parts if path.name == "__init__.py" else relative.with_suffix("").parts)
-        room = room_of(module, packages)
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        if module == room:
-            said[room] = (ast.get_docstring(tree) or "").partition("\n\n")[0].replace("\n", " ")
-        edges[room] |= set()
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                origin = node.module.removeprefix("discsim.") if node.module.startswith(inner) else node.module
-                for name in (f"{origin}.{alias.name}" for alias in node.names):
-                    name = name.removeprefix("discsim.") if name in inner else name
-                    target = name if name in known else origin
-                    if target in known and room_of(target, packages) != room:
-                        edges[room].add(room_of(target, packages))
+        said[module] = (ast.get_docstring(tree) or "").partition("\n\n")[0].replace("\n", " ")
+        arrows[module] = set() if relative == DOOR else imported(tree, known)
+    place = {module: room_of(module, packages) for module in arrows}
+    below = {
+        target
+        for module, targets in arrows.items()
+        for target in targets
+        if target not in packages and place[target] in APART and place[module].startswith(f"{place[target]}.")
+    }
+    place |= {module: module for module in below}
+    edges: dict[str, set[str]] = defaultdict(set)
+    for module, targets in arrows.items():
+        edges[place[module]] |= {place[target] for target in targets} - {place[module]}
     return said, edges
+
+
+def imported(tree: ast.AST, known: set[str]) -> set[str]:
+    """Return the modules of ours, called as their folders, that a source imports."""
+    inner = tuple(f"discsim.{top}" for top in ("estimators", "validation"))
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            origin = node.module.removeprefix("discsim.") if node.module.startswith(inner) else node.module
+            for name in (f"{origin}.{alias.name}" for alias in node.names):
+                name = name.removeprefix("discsim.") if name in inner else name
+                target = name if name in known else origin
+                found |= {target} & known
+    return found
 
 
 def floors(edges: Mapping[str, set[str]]) -> dict[str, int]:
