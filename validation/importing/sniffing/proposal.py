@@ -20,7 +20,7 @@ from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.own_place import OwnPlace
 from discsim.validation.importing.sniffing.track import SPIN, WOBBLE, ProposedTrack
 
-__all__ = ["Proposal", "ProposedSensor", "map_text"]
+__all__ = ["Proposal", "ProposedReference", "ProposedSensor", "map_text"]
 
 _COMMA = 'separator = ","'
 _AIR = (
@@ -50,11 +50,22 @@ class ProposedSensor:
 
 
 @dataclass(frozen=True)
+class ProposedReference:
+    """A column that tells the rate of a rate table, ``sign`` -1 where it counts against the body's z."""
+
+    numbers: Numbers
+    column: str
+    unit: str
+    sign: float
+    decision: Decision
+
+
+@dataclass(frozen=True)
 class Proposal:
     """A proposed map; ``decisions`` are those on the whole (axes), ``notes`` what else a user should know.
 
-    ``fixes`` are a receiver's, ``track`` is a camera's and ``place`` where the log says that it was made, None where
-    there is none.
+    ``fixes`` are a receiver's, ``track`` is a camera's, ``reference`` a rate table's and ``place`` where the log says
+    that it was made, None where there is none.
     """
 
     name: str
@@ -68,6 +79,7 @@ class Proposal:
     fixes: ProposedFixes | None = None
     place: OwnPlace | None = None
     track: ProposedTrack | None = None
+    reference: ProposedReference | None = None
 
     @property
     def all_decisions(self) -> list[Decision]:
@@ -79,6 +91,7 @@ class Proposal:
         return [
             *found,
             *self.decisions,
+            *([self.reference.decision] if self.reference is not None else []),
             *([self.fixes.decision] if self.fixes is not None and not self.fixes.apart else []),
             *(self.track.decisions if self.track is not None else ()),
         ]
@@ -140,6 +153,8 @@ def map_text(proposal: Proposal) -> str:
     ]
     for sensor in proposal.sensors:
         lines += _sensor(proposal, sensor)
+    if proposal.reference is not None:
+        lines += ["", *_reference(proposal, proposal.reference)]
     if proposal.fixes is not None:
         lines += ["", *_fixes(proposal, proposal.fixes)]
     if proposal.track is not None:
@@ -214,6 +229,12 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
     if sensor.sensor == "accelerometer":
         lines.append("# position_m = [0.0, 0.0, 0.0] # where it sits in the disc: needed for a rate from it")
     return lines
+
+
+def _reference(proposal: Proposal, reference: ProposedReference) -> list[str]:
+    lines = ["[sensors.rate_reference]", *_file(proposal, reference.numbers), _remark(reference.decision)]
+    lines += [f"columns = {_texts([reference.column])}", f"unit = {_text(reference.unit)}"]
+    return lines + [f"scale = {reference.sign}"] * (reference.sign < 0.0)
 
 
 def _fixes(proposal: Proposal, fixes: ProposedFixes) -> list[str]:

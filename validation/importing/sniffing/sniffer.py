@@ -54,6 +54,7 @@ from discsim.validation.importing.sniffing.own_place import own_place
 from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from discsim.validation.importing.sniffing.pull import doubted
+from discsim.validation.importing.sniffing.reference_column import with_reference
 from discsim.validation.importing.sniffing.row_order import order_of
 from discsim.validation.importing.sniffing.seen_turns import (
     OFF_FITTED,
@@ -142,7 +143,7 @@ def sniff(raw: Path, plant: Plant = "free_spin", down: float | None = None) -> P
         proposal = _proposal(sniffed, clock, offsets)
     proposal = replace(proposal, fixes=fixed, place=place).in_field(place and place.field)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
-    return _with_unused(proposal, tables, named, own)
+    return _with_unused(with_reference(proposal, named), tables, named, own)
 
 
 # --------------------------------------------------------------------------------------------------- reading
@@ -355,7 +356,7 @@ def _with_unused(proposal: Proposal, tables: Sequence[Numbers], named: Sequence[
     if proposal.fixes is not None:
         used |= {(proposal.fixes.numbers.path, name) for name in proposal.fixes.columns}
     asked = missing_axes(tables, used, {sensor.sensor for sensor in proposal.sensors})
-    return replace(proposal, notes=(*asked, *proposal.notes, *unused_columns(tables, used)))
+    return replace(proposal, notes=(*asked, *proposal.notes, *unused_columns(tables, used, proposal.plant)))
 
 
 def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError], either: str) -> InputError:

@@ -13,12 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+from discsim.recording import Plant
 from discsim.validation.importing.import_map import UNITS
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers
 from discsim.validation.importing.sniffing.names import NO_READING, penalty_of, read_name, sensor_of
 from discsim.validation.importing.sniffing.units import COUNTS, readings_of
 
-__all__ = ["missing_axes", "one_axis_rate", "unused_columns"]
+__all__ = ["missing_axes", "one_axis_rate", "rate_columns", "unused_columns"]
 
 #: A log of hundreds of columns, or a folder of as many files, fills no screen with them.
 MOST_NAMES, MOST_FILES = 60, 6
@@ -32,8 +33,11 @@ _SPELLINGS = {
 }
 
 
-def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]) -> list[str]:
-    """Return a line for each table with the columns of numbers that are not ``used`` (file and name)."""
+def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]], plant: Plant) -> list[str]:
+    """Return a line for each table with the columns of numbers that are not ``used`` (file and name).
+
+    ``plant`` is what the log was taken for: the rate of a rate table is taken where it is called one.
+    """
     notes = []
     for numbers in tables:
         names = [_shown(numbers.table.columns[k]) or f"column {k + 1} (no name)" for k in _left(numbers, used)]
@@ -41,6 +45,7 @@ def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]
         if names:
             rates = _rates(numbers, used)
             read = f"; {rates[0]}" if len(rates) == 1 else ""
+            read += "; of a rate table, --plant rate_table takes it" * (len(rates) == 1 and plant != "rate_table")
             notes.append(f"not used{_of(numbers, tables)}: {', '.join(names[:MOST_NAMES])}{more}{read}")
     others = len(notes) - MOST_FILES
     return notes[:MOST_FILES] + ([f"not used: columns of {others} more files"] if others > 0 else [])
@@ -115,15 +120,23 @@ def one_axis_rate(tables: Sequence[Numbers]) -> str | None:
 
 def _rates(numbers: Numbers, used: Collection[tuple[Path, str]]) -> list[str]:
     """Return how a map takes each column that is not ``used`` and whose unit is that of a rate."""
+    return [
+        f"'{_shown(name)}' is a rate about one axis: a map takes it in [sensors.rate_reference], "
+        f'columns = ["{_shown(name)}"], unit = "{unit}"'
+        for name, unit in rate_columns(numbers, used)
+    ]
+
+
+def rate_columns(numbers: Numbers, used: Collection[tuple[Path, str]]) -> list[tuple[str, str]]:
+    """Return name and unit of each column that is not ``used`` and whose unit is that of a rate."""
     found = []
     for k in _left(numbers, used):
+        name = numbers.table.columns[k]
         units = [reading.unit for reading in readings_of(read_name(numbers.names[k]).unit)]
-        name = _shown(numbers.table.columns[k])
-        bare = [reading.unit for reading in readings_of(name)]  # 'rpm'
+        bare = [reading.unit for reading in readings_of(_shown(name))]  # 'rpm'
         unit = next((unit for unit in (*units, *bare) if unit in UNITS["rad_s"] and unit != "Hz"), None)
         if unit is not None:  # 'rate (Hz)' is a sampling rate as often
-            text = f'columns = ["{name}"], unit = "{unit}"'
-            found.append(f"'{name}' is a rate about one axis: a map takes it in [sensors.rate_reference], {text}")
+            found.append((name, unit))
     return found
 
 
