@@ -55,6 +55,32 @@ def test_a_unit_that_nothing_states_is_told_by_the_pull_to_the_centre(tmp_path):
     assert f"gyroscope unit: rad/s (likely: {why})" in whole.summary()
 
 
+def slowly(path: Path, gyro: np.ndarray, accel: np.ndarray) -> str:
+    """Return what is said of the gyroscope's unit in a part of a log, of which no header states any."""
+    t = 0.005 * np.arange(len(gyro))
+    columns = [("t", t), *three(named("g{}"), np.round(gyro, 2)), *three(named("a{}"), np.round(accel, 3))]
+    (line,) = (
+        line for line in import_log(write_table(path, columns)).summary().splitlines() if "gyroscope unit" in line
+    )
+    return line
+
+
+def test_a_throw_by_itself_whose_spin_hardly_changes_tells_its_unit_by_a_pull_that_no_gravity_is(tmp_path):
+    """31 rad/s of a throw alone without units came in as 31 deg/s."""
+    kept = slice(810, 930)
+    assert np.ptp(LOG.gyro[kept, 2]) < 0.1 * np.max(np.abs(LOG.gyro[kept, 2]))
+    assert "rad/s (likely: the pull to the centre is that of 16" in slowly(
+        tmp_path / "log.csv", LOG.gyro[kept], LOG.accel[kept]
+    )
+
+
+def test_gravity_across_a_slow_turn_is_no_pull(tmp_path):
+    rng, t = np.random.default_rng(4), 0.005 * np.arange(400)
+    gyro = np.column_stack([0 * t, 0 * t, 31.0 + 0 * t]) + rng.normal(0.0, 0.05, (400, 3))
+    accel = np.column_stack([G0 * np.cos(0.54 * t), G0 * np.sin(0.54 * t), 0 * t])
+    assert "pull to the centre" not in slowly(tmp_path / "log.csv", gyro, accel + rng.normal(0.0, 0.05, (400, 3)))
+
+
 def test_a_line_of_units_with_some_that_are_none_known_is_one(tmp_path):
     """Shimmer's has `local_flux` of a magnetometer, and `m/(s^2)`: it was taken for the names."""
     raw = both(tmp_path / "log.csv", LOG.gyro / DEG, LOG.accel * G0, mag=LOG.mag / 50)

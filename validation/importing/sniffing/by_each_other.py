@@ -14,7 +14,7 @@ from discsim.recording import SENSORS
 from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import Unit
-from discsim.validation.importing.sniffing.pull import arm, unit_by_pull
+from discsim.validation.importing.sniffing.pull import arm, steady_arm, unit_by_pull
 from discsim.validation.importing.sniffing.rests import unit_by_rests
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.units import COUNTS
@@ -71,7 +71,8 @@ def _by_pull(
         in_si(sensor, found[sensor], times[sensor], units[sensor]) for sensor in ("gyroscope", "accelerometer")
     )
     seen = arm(gyro, accel)
-    unit = unit_by_pull(units["gyroscope"], seen)
+    shown = steady_arm(gyro, accel) if seen is None and units["gyroscope"].decision.sure == "guess" else seen
+    unit = unit_by_pull(units["gyroscope"], shown)
     return (units, seen) if unit is None else ({**units, "gyroscope": unit}, None)
 
 

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from discsim.validation.importing.import_map import UNITS
+from discsim.arrays import FloatArray
+from discsim.validation.importing.import_map import G0, UNITS
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 
-__all__ = ["arm", "doubted", "unit_by_pull"]
+__all__ = ["arm", "doubted", "steady_arm", "unit_by_pull"]
 
 #: Fewest rows, and how much the rate changes over them (ninth tenth over first): the pull must follow its square.
 ROWS, CHANGES = 30, 1.15
 #: Median share by which the pull may miss the square: at 16 mm and 40 rad/s it is 26 m/s^2, and a wobble of 5 degrees
 #: brings 0.8 m/s^2 of gravity across the axis.
 MISSES = 0.1
+#: A pull that follows no change of the rate is one where it is steadily by this factor more than gravity could read.
+BEYOND = 1.2
 #: Arms in m that a disc, a wheel or a phone on a table can have, and from which on none has.
 POSSIBLE, IMPOSSIBLE = (0.002, 0.5), 3.0
 #: ... and down to which none has: chips are 3 mm wide, and nobody glues one to a twentieth of that.
@@ -30,17 +33,35 @@ DOUBTED = (10.0, 100.0)
 
 def arm(gyro: Reading3, accel: Reading3) -> float | None:
     """Return how far from the axis an accelerometer (m/s^2) sits by a gyroscope (rad/s), m; None where none shows."""
+    size, across = _fast_rows(gyro, accel)
+    if size.size < ROWS or not np.percentile(size, 90) > CHANGES * np.percentile(size, 10):
+        return None
+    return _by_square(size, across)
+
+
+def steady_arm(gyro: Reading3, accel: Reading3) -> float | None:
+    """Return the same of a rate that hardly changes, as a throw's by itself; None where gravity could read as much."""
+    size, across = _fast_rows(gyro, accel)
+    if size.size < ROWS or not np.percentile(across, 5) > BEYOND * G0:
+        return None
+    return _by_square(size, across)
+
+
+def _fast_rows(gyro: Reading3, accel: Reading3) -> tuple[FloatArray, FloatArray]:
+    """Return rates (n,) rad/s and forces across their axis (n,) m/s^2 where it turns fast; none where rows are few."""
     sound, there = np.isfinite(gyro.value).all(axis=1), np.isfinite(accel.value).all(axis=1)
     if sound.sum() < ROWS or there.sum() < ROWS:
-        return None
+        return np.zeros(0), np.zeros(0)
     rate = np.column_stack([np.interp(accel.t[there], gyro.t[sound], column) for column in gyro.value[sound].T])
     size = np.linalg.norm(rate, axis=1)
     fast = size > 0.5 * float(np.percentile(size, 99.5))
-    if fast.sum() < ROWS or not np.percentile(size[fast], 90) > CHANGES * np.percentile(size[fast], 10):
-        return None
     force, axis = accel.value[there][fast], rate[fast] / size[fast, None]
-    across = np.linalg.norm(force - np.sum(force * axis, axis=1)[:, None] * axis, axis=1)
-    arms = across / size[fast] ** 2
+    return size[fast], np.linalg.norm(force - np.sum(force * axis, axis=1)[:, None] * axis, axis=1)
+
+
+def _by_square(size: FloatArray, across: FloatArray) -> float | None:
+    """Return the arm, m, by which forces across follow the square of the rate; None where they do not."""
+    arms = across / size**2
     middle = float(np.median(arms))
     return middle if np.median(np.abs(arms / middle - 1)) < MISSES else None
 
