@@ -324,7 +324,8 @@ def unfolding(recording: Recording, settings: FusionSettings | None = None) -> t
 
     Above half its sampling rate the field shows r - 2 pi f_s k. The gyroscope's z, or the centripetal force, tells k;
     a clipped one only bounds it, and then a free spin has to slow down, too. Without another sensor k is taken as zero,
-    as far as that is known; where a sensor excludes zero and cannot choose among the rest the answer is unknown.
+    as far as that is known; where a sensor excludes zero and cannot choose among the rest the answer is unknown. Where
+    the direction that a clipped gyroscope shows leaves no spin of a throw it is no folding that the sensors differ by.
     """
     settings = settings or FusionSettings()
     magnetometer = recording.need("magnetometer")
@@ -341,6 +342,8 @@ def unfolding(recording: Recording, settings: FusionSettings | None = None) -> t
     longest = max(plain, key=lambda track: len(track.t))
     votes = _by_gyroscope(recording, rates, fold, longest)
     votes += [_slowing(longest, rates, _slope_sd(longest))] if alone else []
+    if votes and not set.intersection(*votes):
+        return 0, True  # no throw turns so that the field would show this: an axis is reversed, or readings are lost
     # a mount that is wrong shows any rate: it is asked where it shows one that the field cannot
     votes += _by_pull(recording, rates, settings) if outside else []
     possible = set(rates)

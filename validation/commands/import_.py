@@ -153,6 +153,7 @@ def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) 
         import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
         found = take(logged, name, import_map, asked.part, decisions)
         found.report(out)
+        run.replace_recordings()
         dip = dip_at_rest(found.read.readings, import_map.environment.gravity)
         _tell(run, [*found.remarks, *filter(None, [doubt, swapped_place(place, date, found.recordings, dip)])])
     for line in found.lines:

@@ -18,7 +18,7 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import digest, write_text
-from discsim.validation.reporting.written import alone_in, watching
+from discsim.validation.reporting.written import Written, alone_in, watching
 from discsim.version import commit, version
 
 __all__ = ["Run", "current_run", "package_version", "source_digest", "start_run"]
@@ -69,6 +69,7 @@ class Run:
     command: list[str]
     seed: int | None
     inputs: list[Path] = field(default_factory=list)
+    written: Written | None = None
 
     @cached_property
     def rng(self) -> np.random.Generator:
@@ -78,6 +79,12 @@ class Run:
     def write_json(self, name: str, content: Any) -> None:
         """Write ``out/name`` whole or not at all."""
         write_text(self.out / name, json_text(content))
+
+    def replace_recordings(self) -> None:
+        """Take away recordings that an earlier run left in the folder and this one did not write anew, aloud."""
+        if self.written is not None:
+            for folder in self.written.without_earlier("recording.toml"):
+                self.step(f"taken away: the recording that an earlier run had written into {folder}")
 
     def step(self, text: str) -> None:
         """Say what happens now: one line on stderr."""
@@ -133,6 +140,7 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
         token = _CURRENT.set(run)
         try:
             with watching(out) as written:
+                run.written = written
                 yield run
         finally:
             _CURRENT.reset(token)

@@ -69,6 +69,30 @@ class Written:
         """Take away what stood in the place of a run.json, which has the list now."""
         (self.out / _UNFINISHED).unlink(missing_ok=True)
 
+    def without_earlier(self, marker: str) -> list[Path]:
+        """Take away what an earlier run wrote beside a file called ``marker`` that this one has not written anew.
+
+        Returns the folders. What was changed since, or written by somebody else, stays in its folder: an `InputError`
+        names it, unless --force was given.
+        """
+        earlier = self.before or {}
+        folders = {Path(name).parent for name in earlier if Path(name).name == marker and name not in self.now}
+        stale = [name for name in earlier if Path(name).parent in folders and name not in self.now]
+        there = [(name, self.out / name) for name in stale if (self.out / name).is_file()]
+        for name, path in there:
+            if not self._ours(name, path):
+                raise InputError(
+                    f"{path}: is of an earlier run, and was changed since; expected another --out, or --force to take "
+                    "it away"
+                )
+        for _, path in there:
+            path.unlink()
+        found = sorted({path.parent for _, path in there})
+        for folder in found:
+            if folder != self.out and not any(folder.iterdir()):
+                folder.rmdir()
+        return found
+
     def digests(self) -> dict[str, str]:
         """Return the digests of what this run has written, and of what an earlier one had and is as it was."""
         kept = {

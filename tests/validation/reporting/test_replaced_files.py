@@ -118,3 +118,37 @@ def test_a_shell_completes_commands_and_their_options(words, found, monkeypatch,
     with pytest.raises(SystemExit):
         main()
     assert set(found) <= set(capsys.readouterr().out.split())
+
+
+def recorded(out: Path, folders: list[str]) -> None:
+    with start_run(out) as run:
+        for folder in folders:
+            write_text(out / folder / "recording.toml", folder)
+            write_text(out / folder / "gyroscope.csv", "1")
+        run.replace_recordings()
+
+
+def test_recordings_of_an_earlier_run_go_where_a_later_one_has_fewer(tmp_path, capsys):
+    """A log of one throw after one of two left the second: two logs were one data set."""
+    recorded(tmp_path, ["01", "02"])
+    recorded(tmp_path, ["01"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["01", "run.json"]
+    assert list(json.loads((tmp_path / "run.json").read_text())["files"]) == ["01/gyroscope.csv", "01/recording.toml"]
+    assert (
+        f"taken away: the recording that an earlier run had written into {tmp_path / '02'}" in capsys.readouterr().err
+    )
+
+
+def test_what_somebody_put_beside_an_earlier_recording_stays(tmp_path):
+    recorded(tmp_path, ["01", "02"])
+    (tmp_path / "02" / "notes.txt").write_text("windy")
+    recorded(tmp_path, ["01"])
+    assert [path.name for path in (tmp_path / "02").iterdir()] == ["notes.txt"]
+
+
+def test_an_earlier_recording_that_was_changed_since_is_refused(tmp_path):
+    recorded(tmp_path, ["01", "02"])
+    (tmp_path / "02" / "gyroscope.csv").write_text("2")
+    with pytest.raises(InputError, match=r"02.gyroscope\.csv: is of an earlier run, and was changed since"):
+        recorded(tmp_path, ["01"])
+    assert (tmp_path / "02" / "gyroscope.csv").read_text() == "2"

@@ -23,6 +23,8 @@ ROWS, CHANGES = 30, 1.15
 MISSES = 0.1
 #: A pull that follows no change of the rate is one where it is steadily by this factor more than gravity could read.
 BEYOND = 1.2
+#: ... and then a wobble may bring this share of it.
+WOBBLES = 0.3
 #: Arms in m that a disc, a wheel or a phone on a table can have, and from which on none has.
 POSSIBLE, IMPOSSIBLE = (0.002, 0.5), 3.0
 #: ... and down to which none has: chips are 3 mm wide, and nobody glues one to a twentieth of that.
@@ -36,7 +38,7 @@ def arm(gyro: Reading3, accel: Reading3) -> float | None:
     size, across = _fast_rows(gyro, accel)
     if size.size < ROWS or not np.percentile(size, 90) > CHANGES * np.percentile(size, 10):
         return None
-    return _by_square(size, across)
+    return _by_square(size, across, MISSES)
 
 
 def steady_arm(gyro: Reading3, accel: Reading3) -> float | None:
@@ -44,7 +46,7 @@ def steady_arm(gyro: Reading3, accel: Reading3) -> float | None:
     size, across = _fast_rows(gyro, accel)
     if size.size < ROWS or not np.percentile(across, 5) > BEYOND * G0:
         return None
-    return _by_square(size, across)
+    return _by_square(size, across, WOBBLES)
 
 
 def _fast_rows(gyro: Reading3, accel: Reading3) -> tuple[FloatArray, FloatArray]:
@@ -59,11 +61,11 @@ def _fast_rows(gyro: Reading3, accel: Reading3) -> tuple[FloatArray, FloatArray]
     return size[fast], np.linalg.norm(force - np.sum(force * axis, axis=1)[:, None] * axis, axis=1)
 
 
-def _by_square(size: FloatArray, across: FloatArray) -> float | None:
-    """Return the arm, m, by which forces across follow the square of the rate; None where they do not."""
+def _by_square(size: FloatArray, across: FloatArray, misses: float) -> float | None:
+    """Return the arm, m, by which forces across follow the square of the rate; None where they miss it by more."""
     arms = across / size**2
     middle = float(np.median(arms))
-    return middle if np.median(np.abs(arms / middle - 1)) < MISSES else None
+    return middle if np.median(np.abs(arms / middle - 1)) < misses else None
 
 
 def unit_by_pull(unit: Unit, seen: float | None) -> Unit | None:
