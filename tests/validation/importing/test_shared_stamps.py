@@ -68,6 +68,15 @@ def test_no_row_is_left_out_and_it_is_said(tmp_path, stamps):
     assert "shared = true" in whole.map_text
 
 
+@pytest.mark.parametrize("rows", [10, 25])
+def test_a_packet_of_rows_under_one_stamp_shares_it(tmp_path, rows):
+    """As radio links send them: from ten rows on the column was no time, and 100 rows a second were guessed."""
+    whole = import_log(log(tmp_path / "log.csv", ("time_ms", (cut_off(LOG.t, rows / RATE) * 1e3).round())))
+    t = whole.recordings[0].samples["gyroscope"].t
+    assert_allclose(np.median(np.diff(t)), 1.0 / RATE, rtol=0.01)
+    assert "rows SHARE a stamp" in whole.summary()
+
+
 def test_a_finer_column_of_time_is_taken_before_a_coarse_one(tmp_path):
     coarse, fine = ("rtcTime", hundredths(LOG.t)), ("time_ms", (LOG.t * 1e3).round())
     assert "time: 'time_ms' in ms" in import_log(log(tmp_path / "log.csv", coarse, fine)).summary()

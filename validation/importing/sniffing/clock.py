@@ -54,8 +54,9 @@ ROUNDED = 0.5
 #: Share of steps that ascend in a column of time: a log has some doubled or swapped rows, never every tenth.
 ASCENDING = 0.9
 #: Share of rows at which a column of time goes on: several sensors' rows share a stamp, a second's rows are no time;
-#: what a sensor's own column may have stood at, at 1 Hz in a log of 500 Hz.
-STEPS, OWN_STEPS = 0.1, 0.002
+#: what a sensor's own column may have stood at, at 1 Hz in a log of 500 Hz. Radio links send packets of 10 to 25 rows
+#: under one stamp, which only a column that is called a time may be.
+STEPS, PACKETS, OWN_STEPS = 0.1, 0.03, 0.002
 #: Steps that must be even before a column with a name that is not known is a clock's: a trend keeps that up for fewer.
 LEAST_EVEN = 100
 #: What a step without stamps may be off by: a guess by a factor of two either way (loggers write 25 to 400 rows a
@@ -220,7 +221,8 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     spoken = numbers.names[k]
     named = is_time_name(spoken)
     # a slow sensor's own stamps stand on the rows of a fast one
-    if not _ascends(value, OWN_STEPS if named and sensor_of(timeless(spoken)) is not None else STEPS):
+    own = named and sensor_of(timeless(spoken)) is not None
+    if not _ascends(value, OWN_STEPS if own else PACKETS if named else STEPS):
         return None
     # what has another name is another thing; of columns without a name the first two may count unevenly
     header, even = numbers.dialect.has_header, named or _evenly(value, spoken)
