@@ -9,15 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.validation.importing.import_map import UNITS
-from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.decision import Decision, Sureness
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
-from discsim.validation.importing.sniffing.proposal import Proposal, ProposedReference
+from discsim.validation.importing.sniffing.proposal import Proposal, ProposedReference, ProposedSensor
 from discsim.validation.importing.sniffing.unused import rate_columns
 
 __all__ = ["with_reference"]
@@ -26,15 +25,6 @@ __all__ = ["with_reference"]
 _ALIKE, _FAST = 0.1, 0.2
 #: what a table was told to do, and did more or less
 _ASKED = re.compile(r"command|cmd|set[ _-]?point|target|demand|desired|soll", re.IGNORECASE)
-
-
-class _Found(NamedTuple):
-    """A column of a rate: its name, unit and sign, and whether a gyroscope turns as fast."""
-
-    column: str
-    unit: str
-    sign: float
-    seen: bool
 
 
 def with_reference(proposal: Proposal, named: Sequence[Triple]) -> Proposal:
@@ -50,42 +40,36 @@ def with_reference(proposal: Proposal, named: Sequence[Triple]) -> Proposal:
     if first.triple.where is not None or first.clock is not None:
         return proposal
     used = {(triple.numbers.path, name) for triple in named for name in triple.names}
-    shown = _about_z(proposal) if first.sensor == "gyroscope" else None
-    columns = [_seen(numbers, column, unit, shown) for column, unit in rate_columns(numbers, used)]
-    measured = [one for one in columns if one.seen] or [one for one in columns if shown is None]
-    if len(measured) > 1:
-        measured = [one for one in measured if not _ASKED.search(one.column)]
-    if len(measured) != 1:
-        return proposal
-    (found,) = measured
-    return replace(
-        proposal, reference=ProposedReference(numbers, found.column, found.unit, found.sign, _decided(found))
-    )
+    shown = _about_z(first) if first.sensor == "gyroscope" else None
+    told = [_told(numbers, column, unit, shown) for column, unit in rate_columns(numbers, used)]
+    found = [one for one in told if one is not None]
+    if len(found) > 1:
+        found = [one for one in found if not _ASKED.search(one.column)]
+    return replace(proposal, reference=found[0]) if len(found) == 1 else proposal
 
 
-def _about_z(proposal: Proposal) -> FloatArray:
-    """Return the rate about the body's z (n,) rad/s that the gyroscope of a proposed map shows, row by row."""
-    (gyro,) = (one for one in proposal.sensors if one.sensor == "gyroscope")
+def _about_z(gyro: ProposedSensor) -> FloatArray:
+    """Return the rate about the body's z (n,) rad/s that a gyroscope shows, row by row of its table."""
     shown = np.full(len(gyro.triple.numbers.values), np.nan)
     shown[gyro.triple.rows] = gyro.triple.values @ gyro.axes[2] * gyro.unit.factor("rad_s")
     return shown
 
 
-def _seen(numbers: Numbers, column: str, unit: str, shown: FloatArray | None) -> _Found:
-    """Return a column of a rate beside what the gyroscope has ``shown`` (n,) rad/s, NaN where it was silent."""
+def _told(numbers: Numbers, column: str, unit: str, shown: FloatArray | None) -> ProposedReference | None:
+    """Return a column of a rate as the reference; None where a gyroscope has ``shown`` (n,) rad/s another rate."""
+    sure: Sureness
     if shown is None:
-        return _Found(column, unit, 1.0, seen=False)
-    rate = numbers.values[:, numbers.table.columns.index(column)] * UNITS["rad_s"][unit]
-    both = np.isfinite(rate) & np.isfinite(shown)
-    fast = both & (np.abs(rate) > _FAST * np.max(np.abs(rate[both]), initial=0.0))
-    ratio = float(np.median(shown[fast] / rate[fast])) if np.any(fast) else 0.0
-    return _Found(column, unit, float(np.copysign(1.0, ratio)), seen=abs(abs(ratio) - 1.0) < _ALIKE)
-
-
-def _decided(found: _Found) -> Decision:
-    why = (
-        "the gyroscope turns as fast" if found.seen else "no gyroscope tells its sign: scale = -1 where it is the other"
+        sign, sure, why = 1.0, "guess", "no gyroscope tells its sign: scale = -1 where it is the other"
+    else:
+        rate = numbers.values[:, numbers.table.columns.index(column)] * UNITS["rad_s"][unit]
+        both = np.isfinite(rate) & np.isfinite(shown)
+        fast = both & (np.abs(rate) > _FAST * np.max(np.abs(rate[both]), initial=0.0))
+        ratio = float(np.median(shown[fast] / rate[fast])) if np.any(fast) else 0.0
+        if abs(abs(ratio) - 1.0) >= _ALIKE:
+            return None
+        sign, sure, why = float(np.copysign(1.0, ratio)), "likely", "the gyroscope turns as fast"
+        why += ", the other way round" * (sign < 0.0)
+    why += "; what a table was told it has not quite done" * bool(_ASKED.search(column))
+    return ProposedReference(
+        numbers, column, unit, sign, Decision("rate reference", f"'{column}' in {unit}", sure, why)
     )
-    why += ", the other way round" * (found.sign < 0.0)
-    why += "; what a table was told it has not quite done" * bool(_ASKED.search(found.column))
-    return Decision("rate reference", f"'{found.column}' in {found.unit}", "likely" if found.seen else "guess", why)

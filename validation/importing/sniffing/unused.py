@@ -44,8 +44,8 @@ def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
         if names:
             rates = _rates(numbers, used)
-            read = f"; {rates[0]}" if len(rates) == 1 else ""
-            read += "; of a rate table, --plant rate_table takes it" * (len(rates) == 1 and plant != "rate_table")
+            option = "" if plant == "rate_table" else "; of a rate table, --plant rate_table takes it"
+            read = f"; {rates[0]}{option}" if len(rates) == 1 else ""
             notes.append(f"not used{_of(numbers, tables)}: {', '.join(names[:MOST_NAMES])}{more}{read}")
     others = len(notes) - MOST_FILES
     return notes[:MOST_FILES] + ([f"not used: columns of {others} more files"] if others > 0 else [])
