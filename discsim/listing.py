@@ -46,7 +46,7 @@ def shown(name: str) -> str:
     kinds = [kind] if kind else list(KINDS)
     found = next((each for each in kinds if own in listed(each)), None)
     if found is None:
-        known = list(dict.fromkeys(other for each in kinds for other in listed(each)))
+        known = [other for each in kinds for other in listed(each)]
         near = ", ".join(get_close_matches(own, known, n=3)) or "what `discsim list` gives"
         raise InputError(f"nothing is called '{name}'; expected {near}")
     return _one(found, own)
