@@ -57,7 +57,8 @@ def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
     if isinstance(value, setup.BoardRotation):
         matrix = setup.board_axes(value)
         right = np.round(matrix)
-        if np.linalg.norm(matrix - right) < _RIGHT and abs(float(np.linalg.det(right))) > 0.5:
+        at_right_angles = np.linalg.norm(matrix - right) < _RIGHT and abs(float(np.linalg.det(right))) > 0.5
+        if at_right_angles and not np.array_equal(right, np.eye(3)):
             lines = "; ".join(_axes_line(name, right, axes) for name in _BOARD)
             return f"to mend it, write into the import map: {lines}"
         return "turn the board back, or diagnose with it: the rotation is estimated"

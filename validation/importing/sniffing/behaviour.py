@@ -180,7 +180,8 @@ def rests_aslant(value: FloatArray) -> str:
     means = sound[: count * 16].reshape(count, 16, 3).mean(axis=1)
     size = np.linalg.norm(means, axis=1)
     shared = float(np.median(size)) if count else 0.0
-    resting = means[np.abs(size - shared) < ALIKE * shared] / max(shared, 1e-300)
+    alike = (np.abs(size - shared) < ALIKE * shared) & (size > 0)
+    resting = means[alike] / size[alike, None]
     if len(resting) < max(4, count / 2) or np.min(resting @ resting.T) > ASLANT:
         return ""
     return f"it reads {shared:.4g} most of the time, in directions that differ"

@@ -17,6 +17,7 @@ from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.pull import arm, steady_arm, unit_by_pull
 from discsim.validation.importing.sniffing.rests import unit_by_rests
 from discsim.validation.importing.sniffing.spin_axis import Reading3
+from discsim.validation.importing.sniffing.swings import unit_by_swings
 from discsim.validation.importing.sniffing.units import COUNTS
 
 __all__ = ["by_each_other", "in_si"]
@@ -33,7 +34,11 @@ def by_each_other(
 
     ``timed`` is whether the rows' times are no guess. The arm is None where it does not show, or has mended a unit.
     """
-    if {"gyroscope", "accelerometer"} - set(found):
+    if "gyroscope" not in found:
+        return units, None
+    if timed:
+        units = _by_swings(found, times, units)
+    if "accelerometer" not in found:
         return units, None
     units = _by_lift(found, times, units)
     gyro, accel = (_reading(times[sensor], found[sensor].values) for sensor in ("gyroscope", "accelerometer"))
@@ -45,6 +50,18 @@ def by_each_other(
 def in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading3:
     """Return a sensor's readings in the recording's unit."""
     return _reading(time, triple.values * unit.factor(SENSORS[sensor].unit))
+
+
+def _by_swings(
+    found: Mapping[str, Triple], times: Mapping[str, FloatArray], units: Mapping[str, Unit]
+) -> Mapping[str, Unit]:
+    """Return the units, a gyroscope's by how often it swings where that refutes deg/s."""
+    gyro, by_radians = _reading(times["gyroscope"], found["gyroscope"].values), None
+    if "accelerometer" in found:
+        accel = in_si("accelerometer", found["accelerometer"], times["accelerometer"], units["accelerometer"])
+        by_radians = steady_arm(gyro, accel)
+    unit = unit_by_swings(units["gyroscope"], gyro, by_radians)
+    return units if unit is None else {**units, "gyroscope": unit}
 
 
 def _by_lift(

@@ -96,7 +96,7 @@ def doubted(unit: Unit, peak: float, seen: float | None) -> Unit:
 
     ``peak`` is its largest reading as written; ``seen`` the arm of the accelerometer in m, None where it does not show.
     """
-    if unit.unit != "rad/s" or unit.scale != 1.0 or not DOUBTED[0] < peak < DOUBTED[1]:
+    if (unit.unit, unit.scale, unit.decision.sure) != ("rad/s", 1.0, "certain") or not DOUBTED[0] < peak < DOUBTED[1]:
         return unit
     if seen is not None and POSSIBLE[0] < seen < POSSIBLE[1]:
         return unit
