@@ -144,6 +144,9 @@ class Recording(Recorded):
     path: Path | None = None
     #: sensor -> times (w, n) s and weights (w, n) of the samples that its n readings are means of, where that is known
     averaged: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    #: C (3, 3) by which readings of a turned board were turned back to body axes (`discsim.written.corrected`): their
+    #: errors are along the board's own; None where it was not turned
+    turned_back: FloatArray | None = None
 
     def __post_init__(self) -> None:
         require_type(self.name, str, "name", "a text")

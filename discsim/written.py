@@ -73,7 +73,10 @@ def corrected(recording: Recording, effects: Sequence[Effect]) -> Recording:
         there = setup.field_there(values["site.field"], environment.magnetic_field)
         environment = replace(environment, magnetic_field=there)
     command = _command_in_seconds(recording.command, samples, _ticks(values))
-    return replace(recording, samples=samples, environment=environment, command=command)
+    back = recording.turned_back
+    if any(rotation := values.get("board.rotation", setup.BoardRotation())):
+        back = setup.board_axes(rotation) if back is None else setup.board_axes(rotation) @ back
+    return replace(recording, samples=samples, environment=environment, command=command, turned_back=back)
 
 
 def _command_in_seconds(command: Samples | None, meant: Mapping[str, Samples], ticks: float) -> Samples | None:

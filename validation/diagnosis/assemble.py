@@ -56,7 +56,7 @@ from discsim.validation.diagnosis.selection.search_state import Considered, Sear
 from discsim.validation.diagnosis.selection.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.diagnosis.settings import settings_told
 from discsim.validation.diagnosis.setup import suspected_fault
-from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
+from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup
 from discsim.validation.diagnosis.stages import Judged, Question
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw
 from discsim.validation.diagnosis.verdict import recalibrations
@@ -494,7 +494,6 @@ def _outcome_of_search(
     best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.fitted)
     errors = beside_losses(found.final.fit, candidates, standard_errors(found.final))
     named = tuple(_named(found, one, less[one.name], names, choices, advice, errors) for one in candidates)
-    named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
     partly = partly_explained(found, names) if unexplained and law is None else ()
     rows = None if unexplained else judged.tried.prepared.rows
     counted = () if rows is None else rows.refined(found.final.fit).effects()

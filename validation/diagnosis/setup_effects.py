@@ -16,8 +16,7 @@ from scipy.optimize import approx_fprime
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, row
-from discsim.effects.kind import BOARD
+from discsim.effects.catalogue import Effect, catalogued, effect, row
 from discsim.effects.sensors import Scale, SoftIron, soft_iron
 from discsim.effects.setup import BoardRotation, ClockUnit, SiteField, TimeOffset
 from discsim.recording import Recording
@@ -42,7 +41,6 @@ __all__ = [
     "SetupAnswer",
     "answer_of_setup",
     "free_parameters",
-    "on_board_axes",
     "with_other_sensor",
     "with_reversed_axes",
     "with_those_borne_out",
@@ -81,13 +79,24 @@ def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | Non
     reads = {}
     for sensor in ("accelerometer", "gyroscope"):
         back = [at.get((catalogued(Scale, sensor).id, name), 0.0) < _REVERSED for name in Scale._fields]
+        # errors are along the axes of the board, limits along those of the corrected readings
+        turned = np.diag(_along_body(np.diag(np.where(back, -1.0, 1.0)), findings))
         beyond = [(sensor, axis) in limits and limits[sensor, axis].reversed for axis in range(3)]
         # a fit with a scale of -1 has what stands at a limit on the right side
-        reads[sensor] = np.diag(np.where(np.logical_or(back, beyond), -1.0, 1.0))
-    reads["magnetometer"] = _read_by_iron(fit)
+        reads[sensor] = np.diag(np.where(beyond, -1.0, turned))
+    reads["magnetometer"] = _along_body(_read_by_iron(fit), findings)
     if all(np.array_equal(own, np.eye(3)) for own in reads.values()):
         return None
     return with_axes_as_read(findings, reads)
+
+
+def _along_body(reads: FloatArray, findings: SetupFindings) -> FloatArray:
+    """Return a signed permutation (3, 3) of a board's axes as one of body axes; none of a board that is askew."""
+    C = findings.recordings[0].turned_back if findings.recordings else None
+    if C is None:
+        return reads
+    turned = C @ reads @ C.T
+    return np.round(turned) if np.linalg.norm(turned - np.round(turned)) < SNAP else np.eye(3)
 
 
 def _read_by_iron(fit: Fit) -> FloatArray:
@@ -210,46 +219,6 @@ def answer_of_setup(
 
 
 _TURNED = catalogued(BoardRotation).id
-
-
-def on_board_axes(effects: Sequence[NamedEffect], findings: SetupFindings, fit: Fit) -> tuple[NamedEffect, ...]:
-    """Return effects whose vectors of a sensor are along the axes of a turned board, as they are in its readings.
-
-    The fit had readings C ((I + S) C^T w + b) of a board that is turned by C: what it found is C b, and C S C^T.
-    """
-    first = next((Rotation.from_rotvec(_numbers(f.effect.value)) for f in findings.faults if f.id == _TURNED), None)
-    if first is None:
-        return tuple(effects)
-    C = first.as_matrix()
-
-    def turned(one: NamedEffect) -> NamedEffect:
-        names = list(one.parameters)
-        kind = CATALOGUE.get(one.id)
-        change = None if kind is None or kind.acts_on not in BOARD else _onto(names, C)
-        if change is None:
-            return one
-        value = change @ np.array([item.value for item in one.parameters.values()])
-        covariance = _covariance_of(fit, one.id, names)
-        sd: list[float | None] = [None] * len(names)
-        if covariance is not None and all(item.sd is not None for item in one.parameters.values()):
-            sd = np.sqrt(np.diag(change @ covariance @ change.T)).tolist()
-        return replace(one, parameters=dict(zip(names, map(ParameterValue, value.tolist(), sd), strict=True)))
-
-    return tuple(map(turned, effects))
-
-
-def _onto(names: Sequence[str], C: FloatArray) -> FloatArray | None:
-    """Return what takes an effect's parameters (k,) along the axes of a disc to those of a board turned by C (3, 3).
-
-    C^T b of a bias or hard iron b, and C^T S C of soft iron S; None where the effect is neither.
-    """
-    if [name[:2] for name in names] == ["bx", "by", "bz"]:
-        return C.T
-    if tuple(names) != SoftIron._fields:
-        return None
-    # linear in S: the columns are what becomes of one number alone
-    every = [soft_iron(SoftIron(*one), np.eye(3)) - np.eye(3) for one in np.eye(6)]
-    return np.column_stack([(C.T @ S @ C)[np.triu_indices(3)] for S in every])
 
 
 def _covariance_of(fit: Fit, id: str, names: Sequence[str]) -> FloatArray | None:

@@ -12,6 +12,7 @@ from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
 from discsim.effects.body import MassImbalance, centre_of_mass
@@ -92,10 +93,15 @@ def predicted(
     rows: FloatArray,
     effects: Competing = CATALOGUED,
 ) -> FloatArray:
-    """Return the readings (..., m, k) of a sensor before lag and noise at true times t (m,) for rows (..., m, 19)."""
+    """Return the readings (..., m, k) of a sensor before lag and noise at true times t (m,) for rows (..., m, 19).
+
+    Errors are along the axes of the board; of one that was turned back the readings are then turned back as well.
+    """
+    back = recording.turned_back if sensor in BOARD else None
     state, model, around = _state(t, rows), _model(sensor, recording, values), _surroundings(recording, values)
     if isinstance(model, Gyroscope):
-        readings = model.reading(state, around, _felt(recording, values, t) if any(model.g_sensitivity) else None)
+        felt = _felt(recording, values, t) if any(model.g_sensitivity) else None
+        readings = model.reading(state, around, felt if felt is None or back is None else felt @ back)
     else:
         readings = model.reading(state, around)
     limit = sized(values, AccelerometerSaturation).limit_m_s2 if sensor == "accelerometer" else np.inf
@@ -108,18 +114,19 @@ def predicted(
     ]
 
     def shown(readings: FloatArray) -> FloatArray:
-        """Return readings (..., m, 3) as they are with a limit, and with effects that act on whole readings."""
+        """Return readings (..., m, 3) with a limit, and with effects that act on whole readings, turned back."""
         readings = np.clip(readings, -limit, limit) if np.isfinite(limit) else readings
         for applied, sizes in acting:
             times = np.broadcast_to(t, rows.shape[:-1]).ravel()
             flat = _state(times, rows.reshape(-1, rows.shape[-1]))
             changed = applied.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, flat)
             readings = changed.reshape(readings.shape)
-        return np.asarray(readings)
+        return np.asarray(readings if back is None else readings @ back.T)
 
     if isinstance(model, Accelerometer) and not plant_of(recording).path_known:
         along = model.reading_of(_ALONG_Z)
-        if acting or np.any(along[:2]):
+        shows = along if back is None else back @ along
+        if acting or np.any(np.abs(shows[:2]) > _ROUND_OFF):
             return _with_lift(along, readings, shown, lambda: _felt(recording, values, t))
     return shown(readings)
 
@@ -170,7 +177,16 @@ def _model(sensor: str, recording: Recording, values: Values) -> Sensor:
     if sensor in ("accelerometer", "gyroscope"):
         stated = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
         errors.append(("position", (0.0, 0.0, 0.0) if stated is None else tuple(stated.tolist())))
+    if recording.turned_back is not None and sensor in BOARD:
+        errors = [(at, _beyond(one, recording.turned_back.tobytes()) if at == "board" else one) for at, one in errors]
     return _made(sensor, tuple(errors))
+
+
+@lru_cache(256)
+def _beyond(more: BoardRotation, turned_back: bytes) -> BoardRotation:
+    """Return the turn of a board of which the readings were turned back by C (3, 3), and that is turned by more."""
+    C = Rotation.from_matrix(np.frombuffer(turned_back).reshape(3, 3))
+    return BoardRotation(*(Rotation.from_rotvec(more) * C).as_rotvec().tolist())
 
 
 @lru_cache(256)
@@ -191,6 +207,8 @@ def _surroundings(recording: Recording, values: Values) -> Surroundings:
 
 
 _ALONG_Z = np.array([0.0, 0.0, 1.0])
+#: what turning there and back leaves of 1
+_ROUND_OFF = 1e-12
 #: least share of the force along z that the z axis reads, for that axis to tell it: one turned by 60 degrees
 _SHARE = 0.5
 
@@ -209,7 +227,7 @@ def _with_lift(
     without = shown(readings)
     slope = shown(readings + along) - without
     # of a motion that ran beyond all numbers there is none
-    tells = bool(np.any(slope[..., :2])) and bool(np.min(np.abs(slope[..., 2])) >= _SHARE)
+    tells = bool(np.any(np.abs(slope[..., :2]) > _ROUND_OFF)) and bool(np.min(np.abs(slope[..., 2])) >= _SHARE)
     if not tells or (whole := felt()) is None:
         return without
     return shown(readings + ((whole[:, 2] - without[..., 2]) / slope[..., 2])[..., None] * along)

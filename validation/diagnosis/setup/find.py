@@ -71,7 +71,7 @@ MENDS = 0.6
 #: no relation may be left to hold worse than this, cost per statement: 7 ordinary errors. A turned board that empties a
 #: gyroscope of clipped readings can hide lost samples at the price of 36 ordinary errors in another relation
 WORST = 2.1
-#: a turned board leaves statements unasked where it makes gaps of what clips: two of the three sensors' at least if less
+#: a turned board leaves statements unasked where it makes gaps of what clips: those of two sensors in three where less
 #: than this share is asked
 ASKED = 0.67
 #: a board is turned whose gyroscope and magnetometer see the spin this far off the board's z, rad, and apart by less
