@@ -29,6 +29,7 @@ from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.reference import ReferenceDoubt, believed, reference_doubts
 from discsim.validation.estimating.method_disagreement import Disagreement, disagreements
 from discsim.validation.estimating.page import write_estimate_page
+from discsim.validation.importing.guesses import guesses_of
 from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from discsim.validation.reporting.run import json_text
 from discsim.validation.running.given import Given, given_recordings
@@ -146,6 +147,7 @@ def estimate_spin(
     rates, left_out = estimate_all(taken, method, Options.of(options), progress)
     left_out.update(("rate_reference", f"it {one.what}") for one in doubts if one.sure and one.about_reference)
     notes = [
+        *guesses_of(given[0]),
         *(f"{one}; the estimates are of the rest" for one in failed),
         *repeats,
         *stamps,

@@ -20,6 +20,7 @@ from discsim.threads import one_thread
 from discsim.validation.checking import check_recording
 from discsim.validation.diagnosis.setup import find_setup_faults, suspected_fault
 from discsim.validation.importing.conversion import Imported, RawReadings, read_readings, repairs_csv
+from discsim.validation.importing.guesses import write_guesses
 from discsim.validation.importing.import_map import ImportMap, find_map, read_map
 from discsim.validation.importing.raw_table import Repair
 from discsim.validation.importing.resting import rest_notes
@@ -154,7 +155,8 @@ class ImportedLog(Result):
     def report(self, folder: Path | str) -> Path:
         """Write the recording (of every throw: a data set), repairs.csv, raw.html and a proposed map into ``folder``.
 
-        Returns the path of raw.html.
+        What the map guessed stands in guesses.txt beside each recording, where `discsim estimate` reads it. Returns the
+        path of raw.html.
         """
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
@@ -165,7 +167,9 @@ class ImportedLog(Result):
         write_raw_page(out / "raw.html", self.name, read, self.throws, self.decisions)
         write_text(out / "repairs.csv", repairs_csv(self.imported[0].repairs))
         for number, recording in enumerate(self.recordings, start=1):
-            write_recording(recording, out / f"{number:02d}" if self.part.every else out)
+            own = out / f"{number:02d}" if self.part.every else out
+            write_recording(recording, own)
+            write_guesses(own, self.decisions)
         return out / "raw.html"
 
 

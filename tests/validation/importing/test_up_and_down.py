@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.made_logs import G0, made_log, write_table
+from support.made_logs import G0, made_log, three, write_table
 
 from discsim.environment import Environment
+from discsim.validation.estimating.spin_estimates import estimate_spin
 from discsim.validation.importing.imported_log import Imported, import_log
 
 LOG = made_log()
@@ -78,3 +79,36 @@ def test_a_place_tells_which_way_its_field_points(tmp_path, south):
     # in the axes of the disc it points down or up, and about the axis of the spin it lies as it may
     assert np.sign(np.median(field[:, 2])) == sign
     assert ("as it does there" in found.summary()) is south
+
+
+BOULDER = Environment(magnetic_field=np.array([21.0, 3.0, 47.0]))
+
+
+@pytest.mark.parametrize("there", [BOULDER, SYDNEY, None])
+@pytest.mark.parametrize("gyro", [True, False])
+def test_the_field_of_the_place_tells_up_from_down_without_an_accelerometer(tmp_path, there, gyro):
+    """The board's z points up, where the field reads what is up of it: it was a guess, and half of them wrong."""
+    field = LOG.mag if there is not SYDNEY else LOG.mag * np.array([1.0, 1.0, -1.0])
+    columns = [("t", LOG.t), *three(["mx", "my", "mz"], field @ BOARD)]
+    if gyro:
+        turned = LOG.gyro if there is not SYDNEY else LOG.gyro * np.array([-1.0, -1.0, 1.0])
+        columns += three(["gx_rad_s", "gy_rad_s", "gz_rad_s"], turned @ BOARD)
+    found = import_log(write_table(tmp_path / "log.csv", columns), environment=there)
+    if there is None:
+        assert "the direction of spin is open; --place and --date would tell it" in found.summary()
+        return
+    assert "body z: along z, which points up and is reversed (likely: the field points" in found.summary()
+    if gyro:
+        rate = found.recordings[0].samples["gyroscope"].value[:, 2]
+        assert float(rate[np.argmax(np.abs(rate))]) > 0.0
+
+
+def test_what_an_import_guessed_stands_by_the_rate(tmp_path):
+    """A direction of spin that was open at the import was certain in the estimate."""
+    columns = [("t", LOG.t), *three(["mx", "my", "mz"], LOG.mag @ BOARD)]
+    found = import_log(write_table(tmp_path / "log.csv", columns))
+    found.report(tmp_path / "recording")
+    (note,) = [one for one in estimate_spin(tmp_path / "recording").notes if "guessed by the import" in one]
+    assert "body z" in note
+    import_log(write_table(tmp_path / "log.csv", columns), environment=BOULDER).report(tmp_path / "recording")
+    assert not any("guessed by the import" in one for one in estimate_spin(tmp_path / "recording").notes)

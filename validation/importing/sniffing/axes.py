@@ -93,17 +93,21 @@ def body_axes(sensors: Mapping[str, Reading3], field_down: float | None = None) 
     spins = axis is not None
     if axis is None:
         axis, found = lying_axis(straight, found.why)
+    both = "gyroscope" in sensors and "magnetometer" in sensors
+    lies = _laid(straight, axis if spins else None, field_down) if both else None
     if axis is None:
         base = np.eye(3)
         decisions = [found]
     else:
         down, why = _downward(axis, straight, flies=spins)
+        if "accelerometer" not in sensors and "magnetometer" in sensors:
+            down, why = _downward_by_field(axis, straight["magnetometer"], lies, field_down, why)
         base = _towards_z(axis, down)
         decisions = [found, why]
     matrix = {sensor: base for sensor in sensors}
     notes = [] if odd is None else [odd.note]
-    if "gyroscope" in sensors and "magnetometer" in sensors:
-        laid, decision, note = _laid(straight, axis if spins else None, field_down)
+    if lies is not None:
+        laid, decision, note = lies
         if odd is not None and odd.sensor == "gyroscope":
             matrix["gyroscope"] = base @ laid.T  # the magnetometer lies as the accelerometer does
         else:
@@ -152,6 +156,25 @@ def _downward(axis: int, sensors: Mapping[str, Reading3], *, flies: bool) -> tup
         return rest < 0, Decision(what, _points(name, rest < 0), "guess", why)
     why = "gravity is never along it at rest, so the direction of spin is open"
     return True, Decision(what, f"along {name}", "guess", why)
+
+
+def _downward_by_field(
+    axis: int, field: Reading3, lies: _Laid | None, field_down: float | None, unknown: Decision
+) -> tuple[bool, Decision]:
+    """Tell by the field of the place whether the sensor's axis points down; ``unknown`` where it does not tell.
+
+    ``lies`` is how the magnetometer lies on the gyroscope, None of one alone.
+    """
+    known = abs(field_down or 0.0) > UP and (lies is None or lies.decision.sure != "guess")
+    value = field.value if lies is None else field.value @ lies.matrix.T
+    along = float(np.nanmedian(value[:, axis]))
+    if field_down is None:
+        return True, unknown._replace(why=f"{unknown.why}; --place and --date would tell it by the field there")
+    if not known or abs(along) < UP * _size(field, np.zeros(3)):
+        return True, unknown
+    down, way = along * field_down > 0, "down" if field_down > 0 else "up"
+    why = f"the field points {way} there, and it reads {along:+.3g} uT along it; flown upright is assumed"
+    return down, Decision(unknown.what, _points("xyz"[axis], down), "likely", why)
 
 
 def _points(name: str, down: bool) -> str:
