@@ -19,6 +19,8 @@ _RATE = re.compile(
 )
 #: A frequency that stands beside these is another one.
 _OTHER = re.compile(r"baud|filter|cut-?off|bandwidth|\bd?lpf\b|cpu|clock|i2c|spi\b|mains", re.IGNORECASE)
+#: ... but not one that comes before them: "at 30 Hz  Filter Normal" (ActiGraph).
+_AT = re.compile(rf"\bat\s+{_NUMBER}\s*(k?)Hz\b", re.IGNORECASE)
 _COUNT = r"(?:LSB|digit|count|bit)s?"
 _WORTH = re.compile(rf"{_NUMBER}\s*([^\s\d,;:=()]+)\s*(?:/|\bper\b)\s*{_COUNT}\b", re.IGNORECASE)
 _PER_UNIT = re.compile(rf"{_NUMBER}\s*{_COUNT}\s*(?:/|\bper\b)\s*\(?([^\s\d,;:=()]+)", re.IGNORECASE)
@@ -36,10 +38,14 @@ def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
     (1000.0, 'Measurement rate, Hz ___________ 1000')
     >>> stated_rate(["# Config: data_rate = 2000.0 Hz, filter = 488 Hz"])
     (2000.0, '# Config: data_rate = 2000.0 Hz, filter = 488 Hz')
+    >>> stated_rate(["Created by ActiGraph at 30 Hz  Filter Normal"])
+    (30.0, 'Created by ActiGraph at 30 Hz  Filter Normal')
     """
     found = {}
     for line in lines:
-        if _OTHER.search(line):
+        if (other := _OTHER.search(line)) is not None:
+            before = line[: other.start()]
+            found.update({_value(m[1]) * (1000 if m[2] else 1): line.strip() for m in _AT.finditer(before)})
             continue
         rates = [_value(m[1]) * (1000 if m[2] else 1) for m in _HERTZ.finditer(line)]
         rates = rates or _rates_by_words(line)

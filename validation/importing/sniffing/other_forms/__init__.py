@@ -17,6 +17,7 @@ from discsim.validation.importing.sniffing.other_forms import (
     headed_lines,
     html_tables,
     json_records,
+    labview,
     line_protocol,
     motion_capture,
     pair_cells,
@@ -35,6 +36,7 @@ __all__ = ["writer_of"]
 
 _FORMS = (
     json_records,
+    labview,
     spreadsheet,
     array_file,
     database,

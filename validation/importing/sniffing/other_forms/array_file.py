@@ -1,11 +1,13 @@
 """Arrays that a program kept: MATLAB's .mat, numpy's .npy and .npz, as tables.
 
 Arrays of one length are columns of one table: `acc` (n, 3) becomes acc_x, acc_y and acc_z, a structure's fields have
-its name before theirs. Nothing in the file is run: numpy's pickled objects and MATLAB's objects are left out.
+its name before theirs. A number `fs` or `dt` beside them stands above the table as its rate. Nothing in the file is
+run: numpy's pickled objects and MATLAB's objects are left out.
 """
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -31,6 +33,8 @@ WIDEST = 40
 #: Bytes of a file that is read whole.
 MAX_BYTES = 1 << 30
 _AXES = "xyz"
+#: Names of a number of rows a second.
+_RATE = re.compile(r"(?:^|_)fs(?:_?hz)?$|(?:sampl\w*|data|frame)[ _]?(?:rate|freq\w*)|^rate(?:_?hz)?$", re.IGNORECASE)
 
 
 def begins(path: Path) -> bool:
@@ -68,9 +72,10 @@ def write_tables(raw: Path, target: Path) -> list[str]:
         )
     lengths = sorted({array.shape[0] for array in columns.values()}, reverse=True)
     tables = {rows: {name: array for name, array in columns.items() if array.shape[0] == rows} for rows in lengths}
-    write_named(target, {"-".join(table)[:80]: _text(table) for table in tables.values()})
+    rate = _rate_line(found)
+    write_named(target, {"-".join(table)[:80]: rate + _text(table) for table in tables.values()})
     read = "; ".join(f"{', '.join(table)} ({rows} rows)" for rows, table in tables.items())
-    left = [name for name in found if name not in columns]
+    left = [name for name, array in found.items() if name not in columns and array.size > 1]
     return [read_and_left(raw, "a file of arrays", read, left)]
 
 
@@ -96,6 +101,8 @@ def _arrays(value: Any, name: str = "") -> Iterator[tuple[str, np.ndarray[Any, A
     if array.dtype.names is not None:
         whole = array.reshape(-1)[0] if array.size == 1 else array
         yield from _arrays({field: whole[field] for field in array.dtype.names}, name)
+    elif array.dtype.kind in "biuf" and array.size == 1:
+        yield name, array.reshape(1, 1)
     elif array.dtype.kind in "biufM" and 1 <= array.ndim <= 2 and array.size > 1:
         table = array.reshape(-1, 1) if array.ndim == 1 else array
         yield name, table.T if table.shape[1] > table.shape[0] else table
@@ -107,6 +114,15 @@ def _text(table: Mapping[str, np.ndarray[Any, Any]]) -> str:
     columns = [_cells(array[:, k]) for array in table.values() for k in range(array.shape[1])]
     header = [names] if all(names) else []
     return comma_separated([*header, *zip(*columns, strict=True)])
+
+
+def _rate_line(found: Mapping[str, np.ndarray[Any, Any]]) -> str:
+    """Return a line above a table that states its rate, by a number that is called so; empty without one."""
+    for name, array in found.items():
+        value, last = float(array.flat[0]) if array.size == 1 else 0.0, name.rpartition("_")[2].casefold()
+        if value > 0.0 and (_RATE.search(name) or last in ("dt", "ts")):
+            return f"# Sampling rate: {1 / value if last in ('dt', 'ts') else value:.9g} Hz, by {name}\n"
+    return ""
 
 
 def _labels(name: str, width: int) -> list[str]:
