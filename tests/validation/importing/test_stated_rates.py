@@ -1,4 +1,4 @@
-"""Logs without a column of times whose file states the rate elsewhere: LabVIEW, a number beside arrays, a first line."""
+"""Logs without times whose file states the rate elsewhere: LabVIEW, a number beside arrays, a first line."""
 
 from __future__ import annotations
 
