@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,11 +28,12 @@ _SDS: Mapping[str, float] = MappingProxyType({"sd_rad_s": 1.0, "sd_deg_s": _DEG,
 #: other names of a rate with its unit, as Rate (deg/s) or spin_dps, and rad/s per unit; Hz alone is no rate of turning
 _RATE_NAME = re.compile(
     r"(?:yaw|spin|r|omega|table|target|command)?[ _]?(?:rate|speed|velocity)?[ _]?"
-    r"[(\[]?(rad[_/]s|deg[_/]s|°/s|dps|rpm|hz)[)\]]?",
+    r"[(\[]?((?:rad|deg|rev)(?:_|/|_per_)s|°/s|dps|rpm|rps|hz)[)\]]?",
     re.I,
 )
+_TURN = 2.0 * np.pi
 _RATE_UNITS: Mapping[str, float] = MappingProxyType(
-    {"rad/s": 1.0, "deg/s": _DEG, "°/s": _DEG, "dps": _DEG, "rpm": _RPM, "hz": 2.0 * np.pi}
+    {"rad/s": 1.0, "deg/s": _DEG, "°/s": _DEG, "dps": _DEG, "rpm": _RPM, "rps": _TURN, "rev/s": _TURN, "hz": _TURN}
 )
 #: other names of a time, as Time (s), t_ms, timestamp, or the unit alone as boards call their counter; s per unit
 _TIME_NAME = re.compile(
@@ -89,7 +91,7 @@ class Told(NamedTuple):
 
 def read_told(path: Path) -> Told:
     """Read the rates of a CSV file; raises `InputError` naming file, line and what was expected."""
-    lines = read_text(path).splitlines()
+    lines = _text(path).splitlines()
     between = next((one for one in _BETWEEN if lines and one in lines[0]), ",")
     rows = list(csv.reader(lines, delimiter=between))
     header = [cell.strip() for cell in rows[0]] if rows else []
@@ -126,6 +128,18 @@ def read_told(path: Path) -> Told:
     return Told(lines[0], header[time_at], header[rate_at], per_rate, tables, at)
 
 
+def _text(path: Path) -> str:
+    """Return a file's text, also where its first bytes say UTF-16, as Excel's "Unicode text" and Windows' shell do."""
+    try:
+        with path.open("rb") as file:
+            wide = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+        return path.read_text(encoding="utf-16") if wide else read_text(path)
+    except UnicodeError as error:
+        raise InputError.at(path, None, f"is no text of UTF-16 ({error}); expected UTF-8") from None
+    except OSError:
+        return read_text(path)  # which says why
+
+
 def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
     """Yield name, times, rates and sds (n,) of each method of a file, in the order of the file."""
     for name, table in read_told(path).tables.items():
@@ -154,7 +168,7 @@ def _rate_column(header: Sequence[str]) -> tuple[int | None, float]:
         (k, found) for k, cell in enumerate(header) if (found := _RATE_NAME.fullmatch(cell)) and cell.lower() != "hz"
     )
     for k, found in named:
-        return k, _RATE_UNITS[found[1].lower().replace("_", "/")]
+        return k, _RATE_UNITS[found[1].lower().replace("_per_", "/").replace("_", "/")]
     return None, 1.0
 
 

@@ -160,6 +160,8 @@ def test_a_truth_is_one_rate_over_time(tmp_path):
     [
         ("Time (ms), Spin rate (deg/s)\n0,90\n500,180\n", 0.5, np.pi),
         ("t_us;spin_dps\n0;90,0\n500000;180,0\n", 0.5, np.pi),
+        ("t_s,spin_rev_per_s\n0,0.25\n0.5,0.5\n", 0.5, np.pi),
+        ("t_s,spin (rps)\n0,0.25\n0.5,0.5\n", 0.5, np.pi),
         ("timestamp\tyaw_rate_rpm\n0\t30\n0.5\t60\n", 0.5, 2 * np.pi),
         ("ms,rpm\n48000,30\n48500,60\n", 48.5, 2 * np.pi),
         ("micros,dps\n0,90\n500000,180\n", 0.5, np.pi),
@@ -170,6 +172,16 @@ def test_other_names_units_and_separators_that_say_the_same_are_read(tmp_path, t
     path.write_text(text)
     (found,) = read_rates(path)
     assert (found.t[1], found.rate[1]) == pytest.approx((t, spin))
+
+
+def test_a_file_of_excel_s_unicode_is_read(tmp_path):
+    path = tmp_path / "rates.txt"
+    path.write_text("time_s\trate_deg_s\n0\t90\n0.5\t180\n", encoding="utf-16")
+    (rates,) = read_rates(path)
+    assert rates.rate[1] == pytest.approx(np.pi)
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(InputError, match=r"is no text of UTF-16"):
+        read_rates(path)
 
 
 @pytest.mark.parametrize(

@@ -210,8 +210,10 @@ def test_what_a_count_is_worth_stands_above_gyroflow_s_logs(tmp_path):
     assert "a line above the table says so" in units["gyroscope unit"].why
 
 
-def test_a_gopro_s_columns_1_and_2_are_the_other_axes_in_their_order(tmp_path):
-    names = ['"Gyroscope (z,x,y) [rad/s]"', "1", "2"]
+@pytest.mark.parametrize("quote", ['"', ""])
+def test_a_gopro_s_columns_1_and_2_are_the_other_axes_in_their_order(tmp_path, quote):
+    """Without quotes the commas in brackets parted the name, and the axes stayed as written."""
+    names = [f"{quote}Gyroscope (z,x,y) [rad/s]{quote}", "1", "2"]
     columns = [("cts", 1e3 * LOG.t), *three(names, LOG.gyro[:, [2, 0, 1]]), ("temperature [°C]", 0 * LOG.t + 33)]
     log = import_log(write_table(tmp_path / "GYRO.csv", columns))
     assert_allclose(log.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-4)

@@ -79,3 +79,32 @@ def test_a_file_of_gravity_beside_one_for_each_sensor_makes_no_logs_of_them(tmp_
     samples = import_log(folder).recordings[0].samples
     assert_allclose(samples["gyroscope"].value, LOG.gyro, atol=1e-4)
     assert_allclose(samples["accelerometer"].value, LOG.accel, atol=1e-4)
+
+
+@pytest.mark.parametrize("quote", ['"', ""])
+def test_a_file_that_is_named_otherwise_is_read_by_a_layout_of_its_own(tmp_path, quote):
+    """A GoPro's two files of one folder need names written into the map, each its own: one was left out."""
+    folder = tmp_path / "log"
+    folder.mkdir()
+    for name, unit, value in (("Gyroscope", "rad/s", LOG.gyro), ("Accelerometer", "m/s2", LOG.accel)):
+        names = [f"{quote}{name} (z,x,y) [{unit}]{quote}", "1", "2"]
+        columns = [("cts", 1e3 * LOG.t), *three(names, value[:, [2, 0, 1]])]
+        write_table(folder / f"{name}.csv", columns)
+    log = import_log(folder)
+    for sensor, value in (("gyroscope", LOG.gyro), ("accelerometer", LOG.accel)):
+        assert_allclose(log.recordings[0].samples[sensor].value, value, atol=1e-4)
+    assert not any("left out" in note for note in log.notes)
+    log.report(tmp_path / "out")
+    again = import_log(folder, map=str(tmp_path / "out" / "map.toml"))
+    assert_allclose(again.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+
+
+def test_a_file_with_other_separators_is_read_where_it_has_another_sensor(tmp_path):
+    folder = tmp_path / "log"
+    folder.mkdir()
+    write_table(folder / "gyro.csv", [("time_s", LOG.t), *three(["gx_rad_s", "gy_rad_s", "gz_rad_s"], LOG.gyro)])
+    columns = [("time_s", LOG.t), *three(["ax_m_s2", "ay_m_s2", "az_m_s2"], LOG.accel)]
+    write_table(folder / "accel.csv", columns, separator=";", decimal=",")
+    log = import_log(folder)
+    for sensor, value in (("gyroscope", LOG.gyro), ("accelerometer", LOG.accel)):
+        assert_allclose(log.recordings[0].samples[sensor].value, value, atol=1e-4)

@@ -74,3 +74,9 @@ def test_a_header_of_degrees_stands_where_nothing_pulls(tmp_path):
     accel[:] = np.array([0.5, 0.0, 9.8]) + np.random.default_rng(1).normal(0, 0.03, accel.shape)
     whole = import_log(written(tmp_path / "log.csv", t, gyro, accel, "g{}_dps"))
     assert "gyroscope unit: deg/s (certain: the header says so" in whole.summary()
+
+
+def test_a_stated_unit_that_the_swing_bears_out_is_in_no_doubt(tmp_path):
+    t, gyro, _ = throw(spin=31.0)
+    whole = import_log(written(tmp_path / "log.csv", t, gyro, gyro_names="g{}_rad_s"))
+    assert "gyroscope unit: rad/s (certain: the header says so" in whole.summary()

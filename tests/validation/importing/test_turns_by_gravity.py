@@ -62,7 +62,9 @@ def test_deg_s_under_a_header_of_rad_s_are_told_by_the_pull_on_a_slow_turntable(
 
 
 def test_where_nothing_tells_that_is_said(tmp_path):
-    columns = [("t_s", LOG.t[FLIGHT]), *three([f"gyro_{axis}_rad_s" for axis in "xyz"], LOG.gyro[FLIGHT])]
+    """It does not even wobble."""
+    steady = LOG.gyro[FLIGHT] * [0.0, 0.0, 1.0] + np.random.default_rng(1).normal(0, 0.003, LOG.gyro[FLIGHT].shape)
+    columns = [("t_s", LOG.t[FLIGHT]), *three([f"gyro_{axis}_rad_s" for axis in "xyz"], steady)]
     told = import_log(write_table(tmp_path / "log.csv", columns)).summary()
     assert "whether it is deg/s, up to 40 deg/s, nothing here tells" in told
 

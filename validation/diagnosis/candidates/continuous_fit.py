@@ -191,10 +191,15 @@ def _begun(relaxed_fit: Fit, parameters: Sequence[Parameter], own: Sequence[Para
     """Return parameters (p,) at a start, the ``own`` ones where a relaxed fit has them if it is beyond all sense.
 
     Far from the data algebra may offer any number, as a clock that runs backwards: the motion begun there never ends
-    anywhere, and what the same algebra offers of the others is no better.
+    anywhere, and what the same algebra offers of the others is no better. An effect's number begins within its bounds:
+    from beyond them, as of a lag of 14 s, no step that keeps them would serve, and it would stay.
     """
-    offered = [start.get((q.key, q.recordings), q.stated) for q in parameters]
-    limits = [BOUNDS.get(q.key, (-np.inf, np.inf)) if q in own else (-np.inf, np.inf) for q in parameters]
+    bounds = [BOUNDS.get(q.key, (-np.inf, np.inf)) for q in parameters]
+    offered = [
+        v if q in own or np.isinf(high - low) else min(max(v, low), high)
+        for q, v, (low, high) in zip(parameters, _offered(parameters, start), bounds, strict=True)
+    ]
+    limits = [each if q in own else (-np.inf, np.inf) for q, each in zip(parameters, bounds, strict=True)]
     pairs = list(zip(offered, limits, strict=True))
     if all(low <= v <= high or np.isinf(high - low) for v, (low, high) in pairs):
         # a number that is bounded on one side is held there by the first step
@@ -202,6 +207,11 @@ def _begun(relaxed_fit: Fit, parameters: Sequence[Parameter], own: Sequence[Para
     known = zip(relaxed_fit.parameters, relaxed_fit.at.tolist(), strict=True)
     relaxed = {(q.key, q.recordings): v for q, v in known if q in own}
     return np.array([relaxed.get((q.key, q.recordings), v) for q, v in zip(parameters, offered, strict=True)])
+
+
+def _offered(parameters: Sequence[Parameter], start: Start) -> list[float]:
+    """Return the first values (p,) of parameters, what is stated of those that ``start`` does not have."""
+    return [start.get((q.key, q.recordings), q.stated) for q in parameters]
 
 
 def _retimed(relaxed_fit: Fit, parameters: Sequence[Parameter], at: FloatArray) -> tuple[Trajectory, ...]:

@@ -59,6 +59,8 @@ def _by_swings(
     gyro, by_radians = _reading(times["gyroscope"], found["gyroscope"].values), None
     if "accelerometer" in found:
         accel = in_si("accelerometer", found["accelerometer"], times["accelerometer"], units["accelerometer"])
+        if arm(gyro, accel) is not None:
+            return units  # the pull tells more than a swing
         by_radians = steady_arm(gyro, accel)
     unit = unit_by_swings(units["gyroscope"], gyro, by_radians)
     return units if unit is None else {**units, "gyroscope": unit}

@@ -265,7 +265,7 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
     if layout.lists and texts:
         texts[-1] = _spread_names(written, lines[record], layout)
     if texts:
-        texts[-1] = _spread_axes(texts[-1])
+        texts[-1] = _spread_axes(_bracketed(texts[-1], width))
     rows = [layout.cells(lines[record]), layout.cells(lines[-1])]
     names = _fitting(texts[-1], width, rows, layout) if texts else None
     if names is not None and names[-1] == UNNAMED:
@@ -308,6 +308,19 @@ def _spread_names(cells: list[str], line: str, layout: Layout) -> list[str]:
     if len(sizes) != len(cells):
         return cells
     return [name for cell, size in zip(cells, sizes, strict=True) for name in names_of_list(cell, size)]
+
+
+def _bracketed(cells: list[str], width: int) -> list[str]:
+    """Return names that the separators within brackets parted as one again, where they are ``width`` names then.
+
+    >>> _bracketed(["cts", "Gyroscope (z", "x", "y) [rad/s]", "1", "2"], 4)
+    ['cts', 'Gyroscope (z,x,y) [rad/s]', '1', '2']
+    """
+    whole: list[str] = []
+    for cell in cells:
+        inside = bool(whole) and whole[-1].count("(") > whole[-1].count(")")
+        whole = [*whole[:-1], f"{whole[-1]},{cell}"] if inside else [*whole, cell]
+    return whole if len(cells) > width == len(whole) else cells
 
 
 def _spread_axes(cells: list[str]) -> list[str]:

@@ -36,7 +36,8 @@ class ProposedSensor:
     """A sensor of a proposed map.
 
     ``clock`` is that of its own column of time, None where it has the file's; ``full_scale`` the range in SI that its
-    readings show, and why; ``time_offset`` what is to be added to its times, s.
+    readings show, and why; ``time_offset`` what is to be added to its times, s; ``layout`` that of its file, where that
+    is laid out otherwise than the log.
     """
 
     sensor: str
@@ -47,6 +48,7 @@ class ProposedSensor:
     clock: Clock | None = None
     full_scale: tuple[float, Decision] | None = None
     time_offset: float | None = None
+    layout: Layout | None = None
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,12 @@ def _layout(layout: Layout) -> list[str]:
     return lines
 
 
+def _own_layout(sensor: str, layout: Layout | None) -> list[str]:
+    if layout is None:
+        return []
+    return [f"[sensors.{sensor}.layout] # its file is laid out in another way", *(_layout(layout) or [_COMMA])]
+
+
 def _file(proposal: Proposal, numbers: Numbers) -> list[str]:
     return [f"file = {_text(glob.escape(numbers.path.name))}"] * proposal.raw.is_dir()
 
@@ -228,7 +236,7 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
         lines.append("mirrored = true")
     if sensor.sensor == "accelerometer":
         lines.append("# position_m = [0.0, 0.0, 0.0] # where it sits in the disc: needed for a rate from it")
-    return lines
+    return lines + _own_layout(sensor.sensor, sensor.layout)
 
 
 def _reference(proposal: Proposal, reference: ProposedReference) -> list[str]:
@@ -249,8 +257,7 @@ def _fixes(proposal: Proposal, fixes: ProposedFixes) -> list[str]:
         lines.append(f"time_offset_s = {fixes.offset:.0f} # added to its times")
     if fixes.apart:
         lines.append("time_offset_s = 0.0 # what is to be added to its times")
-    if fixes.layout is not None:
-        lines += ["[sensors.gps.layout] # its file is laid out in another way", *(_layout(fixes.layout) or [_COMMA])]
+    lines += _own_layout("gps", fixes.layout)
     return [f"# {line}" for line in (fixes.apart, *lines)] if fixes.apart else lines
 
 

@@ -13,7 +13,7 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.files import model_names
 from discsim.recording import SENSORS, Plant
-from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
+from discsim.validation.importing.raw_table import Layout
 from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
 from discsim.validation.importing.sniffing.axes import BodyAxes, body_axes
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour, lines_of_a_record
@@ -28,11 +28,10 @@ from discsim.validation.importing.sniffing.clock import (
     with_shared_stamps,
 )
 from discsim.validation.importing.sniffing.decision import Decision
-from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
 from discsim.validation.importing.sniffing.fixes import fixes_of
 from discsim.validation.importing.sniffing.full_scale import full_scale
-from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
+from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple
 from discsim.validation.importing.sniffing.held_gravity import (
     GRAVITY_ITSELF,
     linear_with_gravity,
@@ -41,6 +40,7 @@ from discsim.validation.importing.sniffing.held_gravity import (
     weightless,
 )
 from discsim.validation.importing.sniffing.late_clock import late_clock, moved
+from discsim.validation.importing.sniffing.log_files import LogFile, laid_out, log_file, own_layout
 from discsim.validation.importing.sniffing.magnitudes import (
     Unit,
     accelerometer_unit,
@@ -55,7 +55,6 @@ from discsim.validation.importing.sniffing.preamble import stated_rate, stated_w
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from discsim.validation.importing.sniffing.pull import doubted
 from discsim.validation.importing.sniffing.reference_column import with_reference
-from discsim.validation.importing.sniffing.row_order import order_of
 from discsim.validation.importing.sniffing.seen_turns import (
     OFF_FITTED,
     OFF_LOOSE,
@@ -67,6 +66,7 @@ from discsim.validation.importing.sniffing.seen_turns import (
 )
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.suggestion import either_gyroscope, suggested
+from discsim.validation.importing.sniffing.swings import swings_once_a_turn
 from discsim.validation.importing.sniffing.track import track_of
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
@@ -84,15 +84,6 @@ FACTORS = tuple(np.geomspace(0.1, 10.0, 9).tolist())
 MOST_UNREAD = 4
 
 
-@dataclass(frozen=True)
-class _File:
-    """A table with its possible clocks and triples."""
-
-    numbers: Numbers
-    clocks: tuple[Clock, ...]
-    triples: tuple[Triple, ...]
-
-
 def sniff(raw: Path, plant: Plant = "free_spin", down: float | None = None) -> Proposal:
     """Propose a map for a raw file, or a folder with one file per sensor.
 
@@ -100,7 +91,7 @@ def sniff(raw: Path, plant: Plant = "free_spin", down: float | None = None) -> P
     where nothing can be read or no three columns look like a sensor of motion.
     """
     files, failures = _read(raw)
-    layout, files, aside, notes = _one_layout(files)
+    layout, files, aside, notes = laid_out(files)
     notes = [*notes, *_unread(raw, failures)]
     found, left, exchanges = _assigned(files)
     tables = [file.numbers for file in files]
@@ -149,17 +140,17 @@ def sniff(raw: Path, plant: Plant = "free_spin", down: float | None = None) -> P
 # --------------------------------------------------------------------------------------------------- reading
 
 
-def _read(raw: Path) -> tuple[list[_File], list[InputError]]:
+def _read(raw: Path) -> tuple[list[LogFile], list[InputError]]:
     """Read the file, or every file of a folder that is a table; what failed in a folder is left for the last word."""
     if raw.is_file():
-        return [_file(raw, alone=True)], []
+        return [log_file(raw, alone=True)], []
     paths = sorted(path for path in raw.iterdir() if path.is_file() and not path.name.startswith("."))
     if len(paths) > MAX_FILES:
         raise InputError.at(raw, None, f"holds {len(paths)} files; expected one folder of a logger's export")
     files, failures = [], []
     for path in paths:
         try:
-            files.append(_file(path, alone=len(paths) == 1))
+            files.append(log_file(path, alone=len(paths) == 1))
         except InputError as error:
             failures.append(error)
     if not files:
@@ -185,68 +176,10 @@ def _unread(raw: Path, failures: Sequence[InputError]) -> list[str]:
     return [*(f"left out: {line}" for line in said[:MOST_UNREAD]), *more]
 
 
-def _file(path: Path, *, alone: bool) -> _File:
-    dialect = dialect_of(path)
-    table = read_raw(path, dialect.layout, RepairList(REPAIRS))
-    numbers = Numbers(table, dialect, alone)
-    clocks = clocks_of(numbers)
-    if (order := order_of(numbers, clocks[0])) is not None:
-        layout = replace(dialect.layout, sorted_by=order.column)
-        dialect = replace(dialect, layout=layout, remarks=(*dialect.remarks, order.remark))
-        table = table.in_order_of(order.column, layout.decimal)
-        numbers = Numbers(table, dialect, alone)
-        clocks = clocks_of(numbers)
-    names = table.columns
-    taken = [names.index(name) for clock in clocks for name in (clock.column, clock.counter) if name is not None]
-    return _File(numbers, tuple(clocks), tuple(triples_of(numbers, taken)))
-
-
-def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[Numbers], list[str]]:
-    """Return the layout that most sensors' files share, those files, receivers' tables in others, what was left out."""
-
-    def key(file: _File) -> Layout:
-        return replace(file.numbers.dialect.layout, comment="", encoding="", decimal=".")
-
-    def weight(file: _File) -> int:
-        return sum(triple.penalty < NO_READING for triple in file.triples)
-
-    classes: dict[Layout, list[_File]] = {}
-    for file in files:
-        classes.setdefault(key(file), []).append(file)
-    best = max(classes.values(), key=lambda members: (sum(map(weight, members)), len(members)))
-    layouts = [file.numbers.dialect.layout for file in best]
-    layout = replace(
-        layouts[0],
-        comment=next((one.comment for one in layouts if one.comment), ""),
-        encoding=next((one.encoding for one in layouts if one.encoding != "utf-8"), "utf-8"),
-        decimal="," if any(one.decimal == "," for one in layouts) else ".",
-    )
-    apart = [file for file in files if file not in best]
-    aside = [file.numbers for file in apart if file.numbers.tells_positions]
-    others = [file for file in apart if weight(file) and not file.numbers.tells_positions]
-    spelt = [file for file in others if replace(key(file), columns=()) == replace(key(best[0]), columns=())]
-    wrongs = (
-        ("named", spelt, "give each of its columns a name of its own in the first line, or import it alone"),
-        (
-            "laid out",
-            [file for file in others if file not in spelt],
-            "save it with the same separator and decimal mark",
-        ),
-    )
-    notes = [
-        f"left out, {how} in another way than {best[0].numbers.path.name}: "
-        f"{', '.join(file.numbers.path.name for file in some)}; to have it read, {remedy}"
-        for how, some, remedy in wrongs
-        if some
-    ]
-    words = [remark for file in best[:1] for remark in file.numbers.dialect.remarks]
-    return layout, best, aside, notes + ([f"text: {', '.join(words)}"] if words else [])
-
-
 # --------------------------------------------------------------------------------------------------- sensors
 
 
-def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]], list[Triple], list[str]]:
+def _assigned(files: Sequence[LogFile]) -> tuple[dict[str, tuple[Triple, Decision]], list[Triple], list[str]]:
     """Return the best triple of each sensor by names, the rest, and a note where names are exchanged."""
     triples = [triple for file in files for triple in file.triples]
     named: dict[str, Triple] = {}
@@ -359,7 +292,7 @@ def _with_unused(proposal: Proposal, tables: Sequence[Numbers], named: Sequence[
     return replace(proposal, notes=(*asked, *proposal.notes, *unused_columns(tables, used, proposal.plant)))
 
 
-def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError], either: str) -> InputError:
+def _nothing(raw: Path, files: Sequence[LogFile], failures: Sequence[InputError], either: str) -> InputError:
     rows = max(len(file.numbers.table) for file in files)
     if rows < FEWEST_ROWS:
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
@@ -493,8 +426,9 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
     seen, pull = by_each_other(_triples(found), times, units, timed=clock.decision.sure != "guess")
     units = dict(seen)
     if "gyroscope" in found and turns is None and found["gyroscope"][0].units:
-        peak = float(np.nanmax(np.abs(found["gyroscope"][0].values)))
-        units = {**units, "gyroscope": doubted(units["gyroscope"], peak, pull)}
+        gyro = found["gyroscope"][0].values
+        if not swings_once_a_turn(Reading3(times["gyroscope"], gyro)):
+            units = {**units, "gyroscope": doubted(units["gyroscope"], float(np.nanmax(np.abs(gyro))), pull)}
     if "gyroscope" in found and not own.clocks:
         ticks = ticking(clock, units["gyroscope"], turns, pull, _triples(found), times)
         if ticks is not None:
@@ -513,10 +447,13 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
         else {}
     )
     sensors = [
-        ProposedSensor(s, triple, decision, units[s], axes.matrix[s], own.clocks.get(s), limits.get(s))
+        replace(
+            ProposedSensor(s, triple, decision, units[s], axes.matrix[s], own.clocks.get(s), limits.get(s)),
+            layout=own_layout(triple.numbers, sniffed.layout),
+            time_offset=offsets[s][0] if s in offsets else None,
+        )
         for s, (triple, decision) in found.items()
     ]
-    sensors = [replace(one, time_offset=offsets[one.sensor][0]) if one.sensor in offsets else one for one in sensors]
     decided = (*own.decisions, *(told for _, told in offsets.values()), *axes.decisions)
     decisions = decided if found else ()  # positions alone have no axes of a board
     head = (_name(sniffed.raw), sniffed.raw, sniffed.plant, sniffed.layout, clock)

@@ -16,7 +16,7 @@ from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.pull import POSSIBLE
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 
-__all__ = ["unit_by_swings"]
+__all__ = ["swings_once_a_turn", "unit_by_swings"]
 
 #: Fewest turns and rows that show a swing: a line of the spectrum is three bins wide under a Hann window.
 TURNS, ROWS = 4.0, 30
@@ -34,12 +34,12 @@ def unit_by_swings(unit: Unit, gyro: Reading3, arm: float | None) -> Unit | None
     """Return rad/s in place of a guess where the rates (n, 3) across the axis swing once a turn of readings in rad/s.
 
     Readings are as written, times in s. A header's deg/s gives way where the accelerometer's ``arm`` by rad/s, m, is
-    one that a disc can have, too.
+    one that a disc can have, too; a guess where none shows, as the pull to the centre tells more than a swing.
     """
     guessed = unit.decision.sure == "guess"
     if unit.scale != 1.0 or unit.unit not in ("deg/s", *["rad/s"] * guessed):
         return None
-    if not guessed and not (arm is not None and POSSIBLE[0] < arm < POSSIBLE[1]):
+    if guessed == (arm is not None and POSSIBLE[0] < arm < POSSIBLE[1]):
         return None
     seen = _swings(gyro)
     if seen is None:
@@ -53,6 +53,12 @@ def unit_by_swings(unit: Unit, gyro: Reading3, arm: float | None) -> Unit | None
     elif arm is not None:
         why = f"{why}, and the pull to the centre is that of {1000 * arm:.3g} mm, although the header says deg/s"
     return Unit("rad/s", 1.0, Decision("gyroscope unit", "rad/s", "likely", why))
+
+
+def swings_once_a_turn(gyro: Reading3) -> bool:
+    """Tell whether rates (n, 3) across the axis swing once a turn of readings in rad/s, so that they are that."""
+    seen = _swings(gyro)
+    return seen is not None and seen[1] > SHARE
 
 
 def _swings(gyro: Reading3) -> tuple[float, float, float] | None:
