@@ -31,6 +31,7 @@ from discsim.validation.diagnosis.setup.hypotheses import (
     TWIN,
     Hypothesis,
     Ranking,
+    beside_physics,
     board_effect,
     chosen,
     hypotheses,
@@ -271,6 +272,9 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
         return [_fault(as_written, found, recordings)], ()
     if as_written is not None and _agrees(as_written):
         return [], ()
+    beside, alone = beside_physics(ranking), next(iter(ranking.found), None)
+    if beside and _agrees(beside[0]) and _gains(alone, beside[0]) and _gains(as_written, beside[0], 2.0):
+        return [_fault(as_written, beside, recordings)], ()
     for both, one, other in pairs(ranking.base)[:1]:
         if _agrees(both) and _gains(as_written, both, 2.0):
             gain = float("inf") if before is None else float(np.sum(before) - both.cost)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
+from types import MappingProxyType
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -34,6 +35,7 @@ __all__ = [
     "TWIN",
     "Hypothesis",
     "Ranking",
+    "beside_physics",
     "board_effect",
     "chosen",
     "hypotheses",
@@ -278,10 +280,33 @@ def _offsets(base: _Base) -> Iterator[Hypothesis]:
             yield best
 
 
-def _rivals(base: _Base) -> Iterator[Hypothesis]:
+#: axes, best by themselves, that are tried with physics beside; each takes a second
+_BESIDE = 6
+
+
+def beside_physics(ranking: Ranking) -> list[Hypothesis]:
+    """Return hypotheses of one sensor's axes with a lag, a clock or lost samples of some sensor beside, best first.
+
+    A clock that is 2 % off turns a phase by more than a mistaken axis does: neither makes the sensors agree alone.
+    """
+    base = ranking.base
+    if not base.signals or not any(np.any(np.isfinite(one.rate)) for one in base.signals):
+        return []
+    found = []
+    for item in sorted((one for one in ranking.found if one.kind == "axes"), key=lambda one: one.cost)[:_BESIDE]:
+        # the signals are those of the base: what it supposes is taken off again
+        own = {item.sensor: item.columns.of(item.sensor) @ base.axes.get(item.sensor, np.eye(3)).T}
+        for both in _rivals(base, own):
+            columns = replace(item.columns, rival=both.columns.rival)
+            found.append(replace(both, kind="axes", sensor=item.sensor, columns=columns, size=item.size + both.size))
+    return sorted(found, key=lambda one: one.charged)
+
+
+def _rivals(base: _Base, axes: Mapping[str, FloatArray] = MappingProxyType({})) -> Iterator[Hypothesis]:
     """Return physics that is no fault of the setup, so that what it explains is not taken for one.
 
     Lags and clocks, and lost samples: a clock of its own in each recording, by which samples were taken ever later.
+    Sensors have their columns, or other ``axes``.
     """
     if not plant_of(base.signals[0].recording).airborne:
         return
@@ -290,7 +315,7 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
     step = PHASE_STEP / (fastest * longest)
 
     def tried(sensor: str, kind: str, sizes: Sequence[float]) -> list[Hypothesis]:
-        columns = [Columns({}, {}, None, {f"{sensor}.{kind}": size}) for size in sizes]
+        columns = [Columns(axes, {}, None, {f"{sensor}.{kind}": size}) for size in sizes]
         return [Hypothesis("rival", sensor, each, *misfit(base.signals, each), 6.0) for each in columns]
 
     least = int(RELAXED_FIT.clock_sigma / step)
@@ -306,7 +331,8 @@ def _losses(sensor: str, clocks: Sequence[Hypothesis]) -> Hypothesis:
     best = [clocks[k] for k in np.argmin([item.costs for item in clocks], axis=0)]
     costs = np.array([item.costs[i] for i, item in enumerate(best)])
     size = float(np.median([item.columns.rival[f"{sensor}.clock"] for item in best]))
-    columns, worst = Columns({}, {}, None, {f"{sensor}.losses": size}), max(item.worst for item in best)
+    columns = replace(best[0].columns, rival={f"{sensor}.losses": size})
+    worst = max(item.worst for item in best)
     return Hypothesis("rival", sensor, columns, costs, best[0].weight, worst, len(best) * best[0].size)
 
 
