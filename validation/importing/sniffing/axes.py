@@ -46,6 +46,9 @@ ONE_WAY = 0.9
 AS_WRITTEN = "as the gyroscope's"
 #: Ways to lay the axes are told apart where one leaves this much less than the other, in the ratio's own size.
 APART = 0.8
+#: A gyroscope is mirrored where that leaves less than this share of what the best axes of a field leave: 0.74 and 0.82
+#: where an axis is reversed, 1.7 and more where it is the magnetometer's, and noise ranks them by 2 %.
+FEWER = 0.9
 #: Noise alone ranks ways that leave no more than this times the least, in a log of 300 rows and more.
 SAME = 1.02
 #: How magnetometers lie on the gyroscope of their package by its data sheet: in an ICM-20948, in an MPU-9250.
@@ -107,13 +110,12 @@ def body_axes(sensors: Mapping[str, Reading3], field_down: float | None = None) 
     matrix = {sensor: base for sensor in sensors}
     notes = [] if odd is None else [odd.note]
     if lies is not None:
-        laid, decision, note = lies
         if odd is not None and odd.sensor == "gyroscope":
-            matrix["gyroscope"] = base @ laid.T  # the magnetometer lies as the accelerometer does
+            matrix["gyroscope"] = base @ lies.matrix.T  # the magnetometer lies as the accelerometer does
         else:
-            matrix["magnetometer"] = base @ laid
-        decisions.append(decision)
-        notes += [note] if note and odd is None else []
+            matrix["gyroscope"], matrix["magnetometer"] = base @ lies.gyro, base @ lies.matrix
+        decisions.append(lies.decision)
+        notes += [lies.note] if lies.note and odd is None else []
     if odd is not None and odd.sensor is not None:
         matrix[odd.sensor] = matrix[odd.sensor] @ odd.matrix(odd.sensor)
         named = " ".join(letters(matrix[odd.sensor]))
@@ -192,11 +194,15 @@ def _lift(axis: int, sensors: Mapping[str, Reading3]) -> float:
 
 
 class _Laid(NamedTuple):
-    """The matrix from the magnetometer's axes to the gyroscope's, what was decided, and a note ("" for none)."""
+    """The matrix from the magnetometer's axes to the gyroscope's, what was decided, and a note ("" for none).
+
+    ``gyro`` is the one from the gyroscope's columns to its axes, where these are mirrored.
+    """
 
     matrix: FloatArray
     decision: Decision
     note: str = ""
+    gyro: FloatArray = np.eye(3)
 
 
 def _compared(sensors: Mapping[str, Reading3]) -> list[Fit]:
@@ -224,6 +230,8 @@ def _laid(sensors: Mapping[str, Reading3], spin: int | None, field_down: float |
         # where the place is known the import looks at all of the rest, and warns
         note = UPWARD if field_down is None and up > UP * _size(sensors["magnetometer"], same.offset) else ""
         return _Laid(np.eye(3), Decision(what, AS_WRITTEN, sure, why), note)
+    if (mirrored := _mirrored_gyroscope(sensors, spin, best)) is not None:
+        return mirrored
     chosen, by = _of_two(alike, sensors["magnetometer"], sensors.get("accelerometer"), field_down)
     named = " ".join(letters(chosen.axes))
     left = next(f.ratio for f in fits if np.array_equal(f.axes, np.eye(3)))
@@ -231,6 +239,31 @@ def _laid(sensors: Mapping[str, Reading3], spin: int | None, field_down: float |
     why += others
     decision = Decision(what, f"{named} in the gyroscope's", "likely" if len(alike) <= 2 else "guess", why)
     return _Laid(chosen.axes, decision, MIRRORED if np.linalg.det(chosen.axes) < 0 else "")
+
+
+def _mirrored_gyroscope(sensors: Mapping[str, Reading3], spin: int | None, best: Fit) -> _Laid | None:
+    """Return the gyroscope's columns mirrored, where the field turns as they say and by no axes of a field does so.
+
+    A rate is no arrow: whichever way the magnetometer's axes are laid, mirrored or not, they are those of a gyroscope
+    that is turned. One axis of it that is reversed leaves rates about the spin axis and a wobble the wrong way round;
+    ``best`` is what is left then.
+    """
+    gyro = sensors["gyroscope"]
+    over = np.diag([1.0, 1.0, -1.0])
+    fits = _compared({**sensors, "gyroscope": Reading3(gyro.t, gyro.value @ over)})
+    if not fits or fits[0].overall > FEWER * best.overall:
+        return None
+    # a magnetometer laid by L in the axes of a gyroscope is one as written beside a gyroscope laid by det(L) L^T
+    laid = fits[0].axes
+    columns = np.linalg.det(laid) * laid.T @ over
+    if spin is not None and abs(columns[spin, spin]) < 0.5:
+        return None
+    named = " ".join(letters(columns))
+    why = (
+        f"{100 * fits[0].ratio:.0f} % of the field's changes are left, {100 * best.ratio:.0f} % by the best axes of a "
+        "magnetometer beside the gyroscope as written"
+    )
+    return _Laid(np.eye(3), Decision("gyroscope axes", f"{named} of its own", "likely", why), MIRRORED, columns)
 
 
 def _by_sense(sensors: Mapping[str, Reading3], spin: int | None, why: str) -> _Laid:
