@@ -440,24 +440,32 @@ def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float
         notes = [*filter(None, [counter_note(clock)]), *notes]
     readings = {sensor: in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
     axes = _body_axes(readings, sniffed)
-    # a table may be told to turn at just such a rate
-    limits = (
-        {"gyroscope": full_scale(readings["gyroscope"])}
-        if "gyroscope" in found and sniffed.plant != "rate_table"
-        else {}
-    )
     sensors = [
         replace(
-            ProposedSensor(s, triple, decision, units[s], axes.matrix[s], own.clocks.get(s), limits.get(s)),
-            layout=own_layout(triple.numbers, sniffed.layout),
-            time_offset=offsets[s][0] if s in offsets else None,
+            one,
+            layout=own_layout(one.triple.numbers, sniffed.layout),
+            time_offset=offsets[one.sensor][0] if one.sensor in offsets else None,
         )
-        for s, (triple, decision) in found.items()
+        for one in _sensors(sniffed, units, axes, readings)
     ]
     decided = (*own.decisions, *(told for _, told in offsets.values()), *axes.decisions)
     decisions = decided if found else ()  # positions alone have no axes of a board
     head = (_name(sniffed.raw), sniffed.raw, sniffed.plant, sniffed.layout, clock)
     return Proposal(*head, tuple(sensors), decisions, (*axes.notes, *notes))
+
+
+def _sensors(
+    sniffed: _Sniffed, units: Mapping[str, Unit], axes: BodyAxes, readings: Mapping[str, Reading3]
+) -> list[ProposedSensor]:
+    """Return the sensors with their units, axes and clocks, and the range at which a gyroscope's readings stand."""
+    own, found = sniffed.own, sniffed.found
+    # a table may be told to turn at just such a rate
+    clips = "gyroscope" in found and sniffed.plant != "rate_table"
+    limits = {"gyroscope": full_scale(readings["gyroscope"])} if clips else {}
+    return [
+        ProposedSensor(s, triple, decision, units[s], axes.matrix[s], own.clocks.get(s), limits.get(s))
+        for s, (triple, decision) in found.items()
+    ]
 
 
 def _body_axes(readings: Mapping[str, Reading3], sniffed: _Sniffed) -> BodyAxes:
