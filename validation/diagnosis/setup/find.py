@@ -268,13 +268,16 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
     found = tuple(item for item in found if item.kind != "rival" and (item.kind != "board" or item.worst < WORST))
     if found and may_be_physics(found[0], rivals):
         return [], _hints(ranking)
-    if found and _agrees(found[0]) and _worth_naming(as_written, found[0], recordings):
-        return [_fault(as_written, found, recordings)], ()
-    if as_written is not None and _agrees(as_written):
+    named = bool(found) and _agrees(found[0]) and _worth_naming(as_written, found[0], recordings)
+    if not named and as_written is not None and _agrees(as_written):
         return [], ()
-    beside, alone = beside_physics(ranking), next(iter(ranking.found), None)
-    if beside and _agrees(beside[0]) and _gains(alone, beside[0]) and _gains(as_written, beside[0], 2.0):
-        return [_fault(as_written, beside, recordings)], ()
+    # other axes than the best may do far better with a wrong clock beside, where the best leaves enough to gain
+    if not named or (found[0].kind == "axes" and found[0].cost > PRICE):
+        beside, alone = beside_physics(ranking), next(iter(ranking.found), None)
+        if beside and _agrees(beside[0]) and _gains(alone, beside[0]) and _gains(as_written, beside[0], 2.0):
+            return [_fault(as_written, beside, recordings)], ()
+    if named:
+        return [_fault(as_written, found, recordings)], ()
     for both, one, other in pairs(ranking.base)[:1]:
         if _agrees(both) and _gains(as_written, both, 2.0):
             gain = float("inf") if before is None else float(np.sum(before) - both.cost)

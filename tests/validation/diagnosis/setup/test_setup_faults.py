@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -21,7 +22,7 @@ from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, find_setup_faults, suspected_fault
 from discsim.validation.diagnosis.setup.find import may_be_physics
-from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, hypotheses
+from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, hypotheses
 from discsim.validation.diagnosis.setup.remedy import place_instead
 from discsim.validation.diagnosis.setup_effects import free_parameters, with_reversed_axes, with_those_borne_out
 from discsim.validation.diagnosis.signals.relations import Columns
@@ -239,6 +240,51 @@ def test_a_shift_of_times_that_physics_explains_as_well_is_left_to_fits(what: st
     assert not may_be_physics(shift, [replace(rival, sensor="gyroscope")])
     assert not may_be_physics(shift, [replace(rival, costs=rival.costs + 5.0)])
     assert not may_be_physics(replace(shift, kind="axes"), [rival])
+
+
+@pytest.mark.parametrize("what", ["clock", "losses", "lag"])
+def test_a_turned_board_that_leaves_half_unasked_gives_way_to_physics_that_does_as_well(what: str):
+    """It made gaps of a gyroscope that clips, and lost samples of the magnetometer came out as `unexplained`."""
+    board = Hypothesis("board", "board", Columns({"gyroscope": np.eye(3)}), np.array([2.0, 2.0]), 113.0, 0.2, 54.4)
+    columns = Columns({}, {}, None, {f"magnetometer.{what}": 0.01})
+    rival = Hypothesis("rival", "magnetometer", columns, np.array([21.0, 21.0]), 242.0, 1.8, 24.0)
+    assert may_be_physics(board, [rival])
+    assert not may_be_physics(replace(board, weight=200.0), [rival])
+    assert not may_be_physics(board, [replace(rival, costs=rival.costs + 5.0)])
+
+
+@pytest.mark.parametrize("ratio", [0.98, 1.02])
+def test_mixed_up_axes_are_told_beside_a_clock_that_is_far_off(ratio: float):
+    """Neither alone makes the sensors agree: such throws came out as `unexplained`."""
+    fault = effect("gyro.axes", axes="x -y z")
+    clock = effect("gyro.clock_rate", ratio=ratio)
+    made = [one for seconds in (3.0, 2.8) for one in throws(errors=[clock], plant="free_spin", seconds=seconds)]
+    findings = find_setup_faults([as_written(one, [fault]) for one in made])
+    assert findings.effects == (fault,)
+    (hint,) = [one for one in findings.hints if one.id == "gyro.clock_rate"]
+    assert hint.value.ratio == pytest.approx(ratio, abs=1e-3)
+
+
+def test_a_clock_that_is_far_off_is_no_mixed_up_axis():
+    made = throws(errors=[effect("gyro.clock_rate", ratio=0.98)], plant="free_spin", seconds=3.0)
+    assert find_setup_faults(made).faults == ()
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.93, False), (0.3, True)])
+def test_a_fault_that_leaves_most_of_what_is_wrong_is_not_named(monkeypatch, share: float, named: bool):
+    """On a table whose board is turned by 4 degrees, and clips, a reversed gyroscope gained a tenth of it."""
+    made = tables()
+
+    def ranked(some: Sequence[Recording], price: float = 0.0) -> Ranking:
+        sound = hypotheses(some)
+        reversed_ = next(one for one in sound.found if one.kind == "axes" and one.sensor == "gyroscope")
+        costs = np.full(len(some), 600.0)
+        written = replace(reversed_, kind="", sensor="", costs=costs, weight=2600.0, worst=2.0, size=0.0)
+        item = replace(reversed_, costs=share * costs, weight=2600.0, worst=2.0)
+        return replace(sound, as_written=written, found=(item,))
+
+    monkeypatch.setattr("discsim.validation.diagnosis.setup.find.hypotheses", ranked)
+    assert bool(find_setup_faults(made).faults) is named
 
 
 def test_lost_samples_in_each_throw_are_a_rival_of_a_shift_of_times():

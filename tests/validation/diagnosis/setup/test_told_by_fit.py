@@ -53,6 +53,16 @@ def meant(findings: SetupFindings | None) -> tuple[Effect, ...]:
     return findings.effects
 
 
+def test_reversed_axes_are_told_beside_a_wrong_clock():
+    """No motion follows them then, and what is left is a fortieth of what any other axes leave."""
+    case = draw_case(2, "flight", kind="nothing")
+    case = replace(case, runs=case.runs[:2], stated_releases=case.stated_releases[:2], longest=3.0)
+    case = replace(case, instruments=case.instruments.with_effects([effect("gyro.clock_rate", ratio=1.004)]))
+    fault = effect("gyro.axes", axes="x -y z")
+    written = [as_written(clipped(one), [fault]) for one in recordings(case)]
+    assert meant(with_fault_that_follows(SetupFindings((), tuple(written)), ["gyroscope"])) == (fault,)
+
+
 def test_without_a_magnetometer_relations_do_not_see_a_reversed_gyroscope_and_a_flight_does(flights):
     fault = effect("gyro.axes", axes="-x -y -z")
     written = [as_written(one, [fault]) for one in flights]
