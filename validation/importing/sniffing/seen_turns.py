@@ -126,7 +126,7 @@ def ticking(
 
     The gyroscope's unit has to be stated, the stamps have to contradict it, and the pull to the centre must not show
     that they are right. Where the unit is likely, as that of whole numbers under a name of time, the pull must show
-    that the gyroscope is. A count that is near a power of ten, or a minute, is taken for it.
+    that the gyroscope is. A count that is near a power of ten is taken for it.
     """
     if clock.column is None or clock.unit == "iso" or clock.scale != 1.0 or unit.decision.sure != "certain":
         return None
