@@ -139,7 +139,8 @@ def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) 
 
     place, date = asked.place, asked.date
     known = recognised(logged) if asked.map_ == "auto" else asked.named
-    proposal = sniff(logged, asked.plant, asked.there.field_down) if known is None else None
+    down = None if place is None else asked.there.field_down  # the usual field of an environment is of no place
+    proposal = sniff(logged, asked.plant, down) if known is None else None
     if proposal is not None and place is not None:
         proposal = proposal.in_field(asked.there.field_strength)
     if known is not None and asked.named is None:
