@@ -113,7 +113,7 @@ def shown_rates(recording: Recording) -> dict[str, ShownRate]:
     shown: dict[str, ShownRate] = {}
     if (turning := _turning_field(recording)) is not None:
         shown["magnetometer"] = turning
-    if (found := usable(recording, "gyroscope")) is not None:
+    if (found := usable(recording, "gyroscope")) is not None and _turns_about_z(recording.samples["gyroscope"].value):
         shown["gyroscope"] = ShownRate(found[0], found[1][:, 2], signed=True)
     place = recording.sheets["accelerometer"].position if "accelerometer" in recording else None
     arm = 0.0 if place is None else float(np.hypot(place[0], place[1]))
@@ -127,6 +127,15 @@ def shown_rates(recording: Recording) -> dict[str, ShownRate]:
         for name, one in shown.items()
         if np.count_nonzero(alive[name]) >= FEWEST
     }
+
+
+def _turns_about_z(rate: FloatArray) -> bool:
+    """Tell whether the spin is about a gyroscope's z (n, 3); of a board that lies on its side z shows a share of it.
+
+    Such a share, of 1/57 by chance, was taken for a reference in deg/s.
+    """
+    size = [float(np.median(one[np.isfinite(one)])) if np.isfinite(one).any() else 0.0 for one in np.abs(rate).T]
+    return size[2] >= max(size)
 
 
 def _turning_field(recording: Recording) -> ShownRate | None:

@@ -315,3 +315,17 @@ def test_a_long_command_of_which_a_part_was_recorded_is_not_doubted():
     run = table(command=True)
     hour = Samples(np.append(PROFILE.t, 3600.0), np.append(PROFILE.value, 0.0))
     assert not [doubt for doubt in reference_doubts(replace(run, command=hour)) if doubt.kind == "clock"]
+
+
+def test_a_board_on_its_side_refutes_no_reference():
+    """Its z shows 1/57 of the rate by chance, and a sound reference was refused as one in deg/s."""
+    tilt = effect("board.rotation", ry_rad=np.pi / 2 - 1 / 57.3)
+    module = Instruments.from_parts("mpu9250").fitted("gyroscope", range=104.72).with_effects([tilt])
+    run = record(
+        spin_down(RIG, FIELD, 60.0, 20.0, yaw=0.3), module, np.random.default_rng(4), plant="spin_down", name="a"
+    )
+    rate = run.samples["gyroscope"].value
+    told = Samples(run.samples["gyroscope"].t, np.linalg.norm(rate, axis=1))
+    sheet = replace(run.sheets["gyroscope"], range=np.inf)
+    samples, sheets = {**run.samples, "rate_reference": told}, {**run.sheets, "rate_reference": sheet}
+    assert list(reference_doubts(replace(run, samples=samples, sheets=sheets))) == []
